@@ -10,7 +10,7 @@ from rigsight.effects import symbols
 from rigsight.effects.effect import Effect
 from rigsight.effects.symbols import derivative, positive_part
 from rigsight.rigs.mechanism import Mechanism
-from rigsight.rigs.parts import READING, Drive
+from rigsight.rigs.parts import Drive, reading_symbol
 
 _INSIDE = sp.Symbol("inside the limits", real=True)
 
@@ -82,16 +82,12 @@ def controller_of(mechanism: Mechanism, drive: Drive) -> Controller | None:
 
 def _motion(mechanism: Mechanism) -> set[sp.Symbol]:
     moving = {symbol for c in mechanism.free for symbol in (c.symbol, c.rate)}
-    return moving | {sp.Symbol(f"{READING}{sensor.name}", real=True) for sensor in mechanism.sensors}
+    return moving | {reading_symbol(sensor.name) for sensor in mechanism.sensors}
 
 
 def _parts(mechanism: Mechanism, law: sp.Expr, inputs: set[sp.Symbol]) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
     rates = {c.rate for c in mechanism.coordinates}
-    of_speed = {
-        sp.Symbol(f"{READING}{sensor.name}", real=True)
-        for sensor in mechanism.sensors
-        if sensor.reads.free_symbols & rates
-    }
+    of_speed = {reading_symbol(s.name) for s in mechanism.sensors if s.reads.free_symbols & rates}
     still = law.xreplace(dict.fromkeys(rates | of_speed, sp.S.Zero))
     error = still if still.free_symbols & _motion(mechanism) else law
     return law, error, sp.expand(law - law.xreplace(dict.fromkeys(inputs, sp.S.Zero)))

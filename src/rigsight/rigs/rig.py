@@ -86,8 +86,7 @@ class Rig:
     @property
     def absent_inputs(self) -> tuple[str, ...]:
         """Names of the inputs that are 0 in a record that holds none of them: those that prescribe no motion."""
-        prescribing = {coordinate.prescribed_by for coordinate in self.mechanism.prescribed}
-        return tuple(signal.name for signal in self.inputs if signal.name not in prescribing)
+        return tuple(s.name for s in self.inputs if s.name not in self.mechanism.prescribing)
 
     @property
     def alternative_parameters(self) -> tuple[Parameter, ...]:

@@ -169,7 +169,12 @@ class Declaration:
             self.refuse(*path_and_sentence(first))
         self.expressions: dict[Path, Expression] = {}
         self._parse()
-        self.symbols = self._declared_symbols()
+        names = [*self.names(*NAMED, "sensors"), *map(force_name, self.table.joints)]
+        written = dict(zip(names, names, strict=True))
+        written |= {
+            rate_name(name): own.rate or rate_name(name) for name, own in self.table.coordinates.items()
+        }
+        self.symbols = {name: sp.Symbol(symbol, real=True) for name, symbol in written.items()}
 
     def refuse(self, path: Path, message: str, within: int | None = None) -> NoReturn:
         """Raise a message with the place of a value, or of the nearest table around it."""
@@ -241,12 +246,6 @@ class Declaration:
             self.expressions[path] = parsed(text)
         except ExpressionError as error:
             self.refuse(path, f"{error}, in '{quoted(text)}'" if text.strip() else str(error), error.place)
-
-    def _declared_symbols(self) -> dict[str, sp.Symbol]:
-        names = [*self.names(*NAMED, "sensors"), *map(force_name, self.table.joints)]
-        rates = {rate_name(name): own.rate or rate_name(name) for name, own in self.table.coordinates.items()}
-        written = dict(zip(names, names, strict=True)) | rates
-        return {name: sp.Symbol(symbol, real=True) for name, symbol in written.items()}
 
 
 def quoted(text: str) -> str:

@@ -135,12 +135,10 @@ def parsed(text: str) -> Expression:
 
 
 def _depth(tree: Tree[Token]) -> int:
-    deepest, waiting = 0, [(tree, 1)]
-    while waiting:
-        node, depth = waiting.pop()
-        deepest = max(deepest, depth)
-        waiting += [(child, depth + 1) for child in node.children if isinstance(child, Tree)]
-    return deepest
+    depth, nodes = 0, [tree]
+    while nodes:
+        depth, nodes = depth + 1, [c for node in nodes for c in node.children if isinstance(c, Tree)]
+    return depth
 
 
 def rate_name(name: str) -> str:

@@ -16,7 +16,7 @@ import sympy as sp
 from rigsight.errors import InputError, nearest
 from rigsight.parameters import Parameter
 from rigsight.records.formats.known import file_size
-from rigsight.rigs.mechanism import Mechanism
+from rigsight.rigs.mechanism import Mechanism, without_signals
 from rigsight.rigs.parts import READING, Coordinate, Drive, Joint, RateState, Sensor, Signal
 from rigsight.rigs.reading.declaration import (
     DRIVE_PARTS,
@@ -201,8 +201,9 @@ def _mechanism(declaration: Declaration, order: list[KeyPath]) -> Mechanism:
             Coordinate(symbols[name], symbols[rate_name(name)], own.unit, own.prescribed_by, own.about)
             for name, own in table.coordinates.items()
         ),
-        kinetic=_written_out(sympy(("energy", "kinetic")), signals),
-        potential=_written_out(sympy(("energy", "potential")), signals),
+        # Of coordinates and rates alone, as they are differentiated by them.
+        kinetic=without_signals(sympy(("energy", "kinetic")), signals),
+        potential=without_signals(sympy(("energy", "potential")), signals),
         joints=tuple(
             Joint(
                 name,
@@ -233,14 +234,6 @@ def _mechanism(declaration: Declaration, order: list[KeyPath]) -> Mechanism:
         if table.simulator
         else (),
     )
-
-
-def _written_out(energy: sp.Expr, signals: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
-    """Return an energy of coordinates and rates alone, as it is differentiated by them."""
-    known: dict[sp.Symbol, sp.Expr] = {}
-    for symbol, signal in signals.items():
-        known[symbol] = signal.xreplace(known)
-    return energy.xreplace(known)
 
 
 def _parameter(
