@@ -81,18 +81,6 @@ class Linearization:
         return found[np.lexsort((found.imag, np.array([float(f"{abs(pole):.9g}") for pole in found])))]
 
     @property
-    def natural_frequencies(self) -> Floats:
-        """Size of each pole [rad/s], shape (n_states,)."""
-        return np.abs(self.poles)
-
-    @property
-    def damping_ratios(self) -> Floats:
-        """Damping ratio of each pole, negative for an unstable pole and NaN for a pole at zero, shape (n_states,)."""
-        size = self.natural_frequencies
-        safe = np.where(size > self._rounding, size, np.nan)
-        return np.asarray(-self.poles.real / safe)
-
-    @property
     def stability(self) -> Stability:
         """Stability from the poles."""
         # ``"drifts"`` if a pole is zero, so that the rig does not return; ``"undamped"`` if others are on the imaginary axis.

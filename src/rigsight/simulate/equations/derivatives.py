@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rigsight.effects.symbols import derivative, positive_part
@@ -79,13 +78,11 @@ class SlopeFunctions:
             else _in_parts(structure, structure.elimination, arguments, by)
         )
 
+        # Indices of the states that are not velocities.
+        self._held = np.concatenate([np.arange(self._n), np.arange(2 * self._n, self._n_states)])
+
     def _place(self, state: Floats, inputs: Floats, p: Floats) -> list[float]:
         return [*state, *inputs, *np.zeros(2 * self._n_inputs), *p, 0.0]
-
-    @property
-    def _held(self) -> NDArray[np.intp]:
-        """Indices of the states that are not velocities."""
-        return np.concatenate([np.arange(self._n), np.arange(2 * self._n, self._n_states)])
 
     def resting(self, near: Floats, inputs: Floats, p: Floats) -> Floats:
         """Return the equilibrium under constant inputs, or the state closest to it, from a nearby state."""
@@ -104,14 +101,12 @@ class SlopeFunctions:
         def slopes(unknown: Floats) -> Floats:
             return self._motion.changes(*at(unknown))[:, held]
 
-        begin = state[held].copy()
+        end = begin = state[held].copy()
         with np.errstate(all="ignore"):
-            found = (
-                least_squares(balance, begin, jac=slopes, x_scale="jac")
-                if np.all(np.isfinite(balance(begin))) and np.all(np.isfinite(slopes(begin)))
-                else None
-            )
-        state[held] = begin if found is None or not found.success else found.x
+            if np.all(np.isfinite(balance(begin))) and np.all(np.isfinite(slopes(begin))):
+                found = least_squares(balance, begin, jac=slopes, x_scale="jac")
+                end = found.x if found.success else begin
+        state[held] = end
         return state
 
     def at(self, state: Floats, inputs: Floats, p: Floats) -> Slopes:
@@ -145,12 +140,9 @@ class SlopeFunctions:
 
 def declared_start(structure: Structure, p: Floats) -> Floats:
     """Return the start values declared in the rig file, shape (n_states,); zero for states without one."""
-    mechanism, values = structure.rig.mechanism, dict(zip(structure.names, p, strict=True))
-    found = np.zeros(len(structure.states))
-    for symbol, expression in mechanism.initial.items():
-        if symbol in structure.states:
-            found[structure.states.index(symbol)] = evaluated(expression, values)
-    return found
+    states, values = structure.states, dict(zip(structure.names, p, strict=True))
+    found = {s: evaluated(own, values) for s, own in structure.rig.mechanism.initial.items() if s in states}
+    return np.array([found.get(state, 0.0) for state in states])
 
 
 def _whole(structure: Structure, arguments: Sequence[sp.Symbol], by: Sequence[sp.Symbol]) -> _Motion:
