@@ -28,26 +28,6 @@ _TINY = sp.Float(1e-300)
 _MODULES: list[Any] = [{positive_part.__name__: lambda x: max(x, 0.0)}, "numpy"]
 
 
-@lru_cache(maxsize=128)
-def slope_functions(structure: Structure) -> SlopeFunctions:
-    """Return the derivatives of a structure's equations; repeated calls return the same object."""
-    return SlopeFunctions(structure)
-
-
-@dataclass(frozen=True, eq=False)
-class Slopes:
-    """Derivatives of the equations at one point."""
-
-    # Of the rates of the states, by states, shape (n_states, n_states), and by inputs and their first and
-    # second time derivatives, shape (3, n_states, n_inputs).
-    states: Floats
-    inputs: Floats
-    # Of the outputs, shapes (n_outputs, n_states) and (3, n_outputs, n_inputs).
-    outputs_by_states: Floats
-    outputs_by_inputs: Floats
-    rests: bool  # whether the point is an equilibrium
-
-
 @dataclass(frozen=True)
 class _Motion:
     """The equations of motion, and the rates of the other states, as functions of states, inputs and parameters."""
@@ -109,8 +89,13 @@ class SlopeFunctions:
         state[held] = end
         return state
 
-    def at(self, state: Floats, inputs: Floats, p: Floats) -> Slopes:
-        """Return the derivatives at a state under constant inputs."""
+    def at(
+        self, state: Floats, inputs: Floats, p: Floats
+    ) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats], bool]:
+        """Return the derivatives of the rates and of the outputs under constant inputs, and whether this is an equilibrium.
+
+        Each by states, shape (n_rows, n_states), and by inputs and their first and second derivatives, (3, n_rows, n_inputs).
+        """
         n, n_states, n_inputs = self._n, self._n_states, self._n_inputs
         place = self._place(state, inputs, p)
         slopes = np.zeros((n_states, n_states + 3 * n_inputs))
@@ -127,15 +112,16 @@ class SlopeFunctions:
                 slopes[n : 2 * n] = np.linalg.solve(mass, by_place[:n] - turned)
         held = self._held
         near = np.abs(by_place[:, held]) @ (_NEAR * np.maximum(np.abs(state[held]), 1.0))
-        by_inputs = slopes[:, n_states:].reshape(n_states, 3, n_inputs)
-        outputs_by = outputs[:, n_states:].reshape(outputs.shape[0], 3, n_inputs)
-        return Slopes(
-            slopes[:, :n_states],
-            np.moveaxis(by_inputs, 1, 0),
-            outputs[:, :n_states],
-            np.moveaxis(outputs_by, 1, 0),
-            bool(np.all(np.abs(balance) <= near)),
-        )
+
+        def divided(rows: Floats) -> tuple[Floats, Floats]:
+            by_inputs = rows[:, n_states:].reshape(rows.shape[0], 3, n_inputs)
+            return rows[:, :n_states], np.moveaxis(by_inputs, 1, 0)
+
+        return divided(slopes), divided(outputs), bool(np.all(np.abs(balance) <= near))
+
+
+slope_functions = lru_cache(maxsize=128)(SlopeFunctions)
+"""The same of a structure, made once."""
 
 
 def declared_start(structure: Structure, p: Floats) -> Floats:
