@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rigsight.records import Record
+from rigsight.rigs.reading.declaration import RigTable
 from rigsight.rigs.reading.rig_file import rig_of_text
-from rigsight.rigs.reading.rig_tables import RigTable
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.read_campaign import read_campaign

@@ -115,7 +115,7 @@ def test_declaration_is_complete(effect):
 
 
 def test_no_effect_is_missed():
-    shared = {"catalogue", "effect", "numbers", "placed", "symbols"}
+    shared = {"catalogue", "effect", "kinds", "placed", "symbols"}
     files = {module.name for module in pkgutil.iter_modules(rigsight.effects.__path__)} - shared
     assert files == {effect.name for effect in CATALOGUE}
     assert len(CATALOGUE) == len({effect.name for effect in CATALOGUE})

@@ -7,8 +7,7 @@ import sympy as sp
 
 from rigsight.errors import InputError
 from rigsight.rigs import AXIS, RUNNING_GEAR, evaluated
-from rigsight.rigs.reading.declaration import to_sympy
-from rigsight.rigs.reading.expressions import parsed
+from rigsight.rigs.reading.expressions import parsed, to_sympy
 
 CONSTANTS = {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27}
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 import sympy as sp
 
-from rigsight.rigs.reading.declaration import to_sympy
-from rigsight.rigs.reading.expressions import ExpressionError, parsed
+from rigsight.rigs.reading.expressions import ExpressionError, parsed, to_sympy
 
 NAMES = {name: sp.Symbol(name, real=True) for name in ("a", "b", "c", "d", "d(phi)")}
 VALUES = dict(zip(NAMES.values(), (0.7, -1.3, 2.1, 0.4, -0.9), strict=True))

@@ -94,7 +94,7 @@ def test_a_force_made_of_every_function_can_be_identified_discovered_and_exporte
     linear = LinearizedResponses(equations, [record], constants, FREE, [np.zeros(2)])
     assert np.all(np.isfinite(linear.errors(truth)))
     p = np.array([VALUES[name] for name in structure.names])
-    assert np.all(np.isfinite(slope_functions(structure).at(np.zeros(2), np.zeros(1), p).states))
+    assert np.all(np.isfinite(slope_functions(structure).at(np.zeros(2), np.zeros(1), p)[0][0]))
     assert not can_drift(own, VALUES)
     assert 0.0 < internal_step(Model(structure, VALUES, "foh")) < 0.1
 

@@ -15,30 +15,19 @@ References: L. Ljung, *System Identification* (Prentice Hall 1999), section 4.2.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
-from rigsight.effects.numbers import amount
+from rigsight.effects.effect import Place, State
+from rigsight.effects.kinds import amount, late
 from rigsight.effects.symbols import u
 
 T_a, u_a = sp.symbols("T_a u_a", real=True)
 
-ACTUATOR_LAG = Effect(
+ACTUATOR_LAG = late(
     name="actuator_lag",
     place=Place.ACTUATOR,
-    family=Family.DELAY_OR_LAG,
     summary="The drive follows its command with a first-order lag.",
     parameters=(
-        amount(
-            "T_a",
-            "time constant",
-            "time",
-            upper=1e6,
-            starts=(0.05, 0.3),
-            search=(1e-3, 10.0),
-            logarithmic=True,
-        ),
+        amount("T_a", "time constant", "time", starts=(0.05, 0.3), search=(1e-3, 10.0), logarithmic=True),
     ),
-    energy=Energy.ACTIVE,
-    signature=Signature(gain_trend=GainTrend.STEADY),
     drive=u_a,
     states=(State(u_a, (u - u_a) / T_a, "input"),),
 )

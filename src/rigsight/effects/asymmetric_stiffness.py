@@ -17,7 +17,7 @@ References: K. Worden and G. R. Tomlinson, *Nonlinearity in Structural Dynamics*
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import signed
+from rigsight.effects.kinds import signed
 from rigsight.effects.symbols import x
 
 k_2 = sp.Symbol("k_2", real=True)

@@ -24,26 +24,20 @@ model M5 without its part that falls with speed.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
-from rigsight.effects.numbers import amount
+from rigsight.effects.effect import Start
+from rigsight.effects.kinds import amount, dry_friction
 from rigsight.effects.symbols import drive_size, driven, load, v
 
 T_c, mu, mu_m, mu_e = sp.symbols("T_c mu mu_m mu_e", real=True)
 
-BACK_DRIVING_FRICTION = Effect(
+BACK_DRIVING_FRICTION = dry_friction(
     name="back_driving_friction",
-    place=Place.DYNAMICS,
-    family=Family.DRY_FRICTION,
     summary="Dry friction grows with the force of the motor and, otherwise, with that of the load.",
     parameters=(
-        amount("T_c", "friction without load", "drive", upper=1e12, starts=(0.05, 0.1), search=(0.0, 2.0)),
-        amount(
-            "mu_m", "friction per force of the motor", "", upper=1.0, starts=(0.1, 0.2), search=(0.0, 1.0)
-        ),
-        amount("mu_e", "friction per force of the load", "", upper=1.0, starts=(0.2, 0.1), search=(0.0, 1.0)),
+        amount("T_c", "friction without load", "drive", starts=(0.05, 0.1), search=(0.0, 2.0)),
+        amount("mu_m", "friction per force of the motor", "", starts=(0.1, 0.2), search=(0.0, 1.0)),
+        amount("mu_e", "friction per force of the load", "", starts=(0.2, 0.1), search=(0.0, 1.0)),
     ),
-    energy=Energy.DISSIPATIVE,
-    signature=Signature(gain_trend=GainTrend.RISES),
     torque=(T_c + sp.Abs(mu_m * driven + mu_e * (load - driven))) * sp.sign(v),
     starts=(
         Start({"T_c": 0.05 * drive_size, "mu_m": sp.Float(0.1), "mu_e": sp.Float(0.2)}),

@@ -19,7 +19,7 @@ M. Nordin and P.-O. Gutman, Automatica 38 (2002) 1633.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
-from rigsight.effects.numbers import amount
+from rigsight.effects.kinds import amount
 from rigsight.effects.symbols import v, x
 
 g, z = sp.symbols("g z", real=True)
@@ -29,9 +29,7 @@ BACKLASH = Effect(
     place=Place.DYNAMICS,
     family=Family.PLAY_AND_STOPS,
     summary="There is play between the displacement and the spring; the play moves along with the motion.",
-    parameters=(
-        amount("g", "half-width of the play", "x", upper=1e9, starts=(0.05, 0.3), search=(0.0, 1.0)),
-    ),
+    parameters=(amount("g", "half-width of the play", "x", starts=(0.05, 0.3), search=(0.0, 1.0)),),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),
     deflection=x - z,

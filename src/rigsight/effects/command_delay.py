@@ -16,18 +16,15 @@ References: L. Ljung, *System Identification* (Prentice Hall 1999), section 4.2.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.effect import Place
+from rigsight.effects.kinds import amount, late
 
 T_m = sp.Symbol("T_m", real=True)
 
-COMMAND_DELAY = Effect(
+COMMAND_DELAY = late(
     name="command_delay",
     place=Place.CONTROLLER,
-    family=Family.DELAY_OR_LAG,
     summary="The controller receives its command late.",
-    parameters=(amount("T_m", "delay", "time", upper=1e6, starts=(0.05, 0.2), search=(0.0, 3.0)),),
-    energy=Energy.ACTIVE,
-    signature=Signature(gain_trend=GainTrend.STEADY),
+    parameters=(amount("T_m", "delay", "time", starts=(0.05, 0.2), search=(0.0, 3.0)),),
     command_delay=T_m,
 )

@@ -16,30 +16,18 @@ References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), cha
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
-from rigsight.effects.numbers import amount
+from rigsight.effects.effect import State
+from rigsight.effects.kinds import amount, of_controller
 from rigsight.effects.symbols import command
 
 T_c, c_c = sp.symbols("T_c c_c", real=True)
 
-COMMAND_FILTER = Effect(
+COMMAND_FILTER = of_controller(
     name="command_filter",
-    place=Place.CONTROLLER,
-    family=Family.CONTROLLER,
     summary="The controller follows a smoothed command.",
     parameters=(
-        amount(
-            "T_c",
-            "time constant",
-            "time",
-            upper=1e6,
-            starts=(0.05, 0.3),
-            search=(1e-3, 10.0),
-            logarithmic=True,
-        ),
+        amount("T_c", "time constant", "time", starts=(0.05, 0.3), search=(1e-3, 10.0), logarithmic=True),
     ),
-    energy=Energy.ACTIVE,
-    signature=Signature(gain_trend=GainTrend.STEADY),
     command=c_c,
     states=(State(c_c, (command - c_c) / T_c, "input"),),
 )

@@ -18,17 +18,15 @@ References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), cha
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
-from rigsight.effects.numbers import limit
+from rigsight.effects.effect import GainTrend, Signature, State
+from rigsight.effects.kinds import limit, of_controller
 from rigsight.effects.symbols import beyond, clamp, command
 from rigsight.parameters import Parameter
 
 w_c, T_f, c_l = sp.symbols("w_c T_f c_l", real=True)
 
-COMMAND_RATE_LIMIT = Effect(
+COMMAND_RATE_LIMIT = of_controller(
     name="command_rate_limit",
-    place=Place.CONTROLLER,
-    family=Family.CONTROLLER,
     summary="The command changes at a limited rate.",
     parameters=(
         limit(
@@ -51,7 +49,6 @@ COMMAND_RATE_LIMIT = Effect(
             fitted=False,
         ),
     ),
-    energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),
     command=command - beyond(command - c_l, w_c * T_f),
     states=(State(c_l, clamp((command - c_l) / T_f, w_c), "input"),),

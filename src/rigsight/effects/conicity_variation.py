@@ -16,7 +16,7 @@ References: A. H. Wickens, *Fundamentals of Rail Vehicle Dynamics* (Swets & Zeit
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import limit
+from rigsight.effects.kinds import limit
 from rigsight.effects.symbols import creep_gain, creepage, lateral_displacement, lateral_feedback
 
 y_n = sp.Symbol("y_n", real=True)

@@ -15,23 +15,18 @@ References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), cha
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.effect import GainTrend, Signature
+from rigsight.effects.kinds import amount, of_controller
 from rigsight.effects.symbols import beyond, error, output
 
 e_0 = sp.Symbol("e_0", real=True)
 
-CONTROLLER_DEAD_BAND = Effect(
+CONTROLLER_DEAD_BAND = of_controller(
     name="controller_dead_band",
-    place=Place.CONTROLLER,
-    family=Family.CONTROLLER,
     summary="The controller ignores small errors.",
     parameters=(
-        amount(
-            "e_0", "half-width of the dead band", "input", upper=1e300, starts=(0.02, 0.1), search=(0.0, 1.0)
-        ),
+        amount("e_0", "half-width of the dead band", "input", starts=(0.02, 0.1), search=(0.0, 1.0)),
     ),
-    energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),
     control=output - error + beyond(error, e_0),
 )

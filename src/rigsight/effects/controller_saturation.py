@@ -17,21 +17,18 @@ References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), cha
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import limit
+from rigsight.effects.effect import GainTrend, Signature
+from rigsight.effects.kinds import limit, of_controller
 from rigsight.effects.symbols import clamp, output
 
 o_max = sp.Symbol("o_max", real=True)
 
-CONTROLLER_SATURATION = Effect(
+CONTROLLER_SATURATION = of_controller(
     name="controller_saturation",
-    place=Place.CONTROLLER,
-    family=Family.CONTROLLER,
     summary="The output of the controller cannot exceed a limit.",
     parameters=(
         limit("o_max", "largest output", "input", lower=0.0, starts=(0.05, 0.2), search=(0.003, 2.0)),
     ),
-    energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),
     control=clamp(output, o_max),
 )

@@ -17,21 +17,14 @@ Righthand Sides* (Kluwer 1988), for sticking.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.kinds import amount, dry_friction
 from rigsight.effects.symbols import v
 
 T_c = sp.Symbol("T_c", real=True)
 
-COULOMB_FRICTION = Effect(
+COULOMB_FRICTION = dry_friction(
     name="coulomb_friction",
-    place=Place.DYNAMICS,
-    family=Family.DRY_FRICTION,
     summary="Dry friction of constant size opposes the motion; the mass sticks while the torque is small.",
-    parameters=(
-        amount("T_c", "Coulomb friction", "drive", upper=1e12, starts=(0.05, 0.3), search=(0.0, 2.0)),
-    ),
-    energy=Energy.DISSIPATIVE,
-    signature=Signature(gain_trend=GainTrend.RISES),
+    parameters=(amount("T_c", "Coulomb friction", "drive", starts=(0.05, 0.3), search=(0.0, 2.0)),),
     torque=T_c * sp.sign(v),
 )

@@ -17,7 +17,7 @@ usual smooth form of the saturation.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import limit
+from rigsight.effects.kinds import limit
 from rigsight.effects.symbols import creep_gain, creepage
 
 s = sp.Symbol("s", real=True)

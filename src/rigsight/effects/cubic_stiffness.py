@@ -17,7 +17,7 @@ References: I. Kovacic and M. J. Brennan, *The Duffing Equation* (Wiley 2011).
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import signed
+from rigsight.effects.kinds import signed
 from rigsight.effects.symbols import x
 
 k_3 = sp.Symbol("k_3", real=True)

@@ -17,23 +17,19 @@ References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), cha
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
-from rigsight.effects.numbers import amount, scale
+from rigsight.effects.effect import State
+from rigsight.effects.kinds import amount, of_controller, scale
 from rigsight.effects.symbols import error, output
 
 T_v, T_f, e_f = sp.symbols("T_v T_f e_f", real=True)
 
-DERIVATIVE_ACTION = Effect(
+DERIVATIVE_ACTION = of_controller(
     name="derivative_action",
-    place=Place.CONTROLLER,
-    family=Family.CONTROLLER,
     summary="The controller reacts to the rate of its error.",
     parameters=(
-        amount("T_v", "derivative time", "time", upper=1e6, starts=(0.05, 0.3), search=(0.0, 3.0)),
-        scale("T_f", "filter of the rate", "time", lower=1e-9, upper=1e6, starts=(0.02,), search=(1e-3, 0.3)),
+        amount("T_v", "derivative time", "time", starts=(0.05, 0.3), search=(0.0, 3.0)),
+        scale("T_f", "filter of the rate", "time", starts=(0.02,), search=(1e-3, 0.3)),
     ),
-    energy=Energy.ACTIVE,
-    signature=Signature(gain_trend=GainTrend.STEADY),
     control=output + T_v * (error - e_f) / T_f,
     states=(State(e_f, (error - e_f) / T_f, "input"),),
 )

@@ -23,7 +23,7 @@ References: J. C. Dixon, *The Shock Absorber Handbook* (Wiley 2007), chapter 7, 
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import signed
+from rigsight.effects.kinds import signed
 from rigsight.effects.symbols import clamp, v
 from rigsight.parameters import Parameter
 

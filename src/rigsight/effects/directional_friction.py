@@ -22,36 +22,19 @@ direction.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
-from rigsight.effects.numbers import amount
+from rigsight.effects.effect import GainTrend, Signature, Start
+from rigsight.effects.kinds import amount, dry_friction
 from rigsight.effects.symbols import drive_size, v
 
 T_fwd, T_bwd, T_c = sp.symbols("T_fwd T_bwd T_c", real=True)
 
-DIRECTIONAL_FRICTION = Effect(
+DIRECTIONAL_FRICTION = dry_friction(
     name="directional_friction",
-    place=Place.DYNAMICS,
-    family=Family.DRY_FRICTION,
     summary="Dry friction is larger in one direction than in the other.",
     parameters=(
-        amount(
-            "T_fwd",
-            "friction while x' is positive",
-            "drive",
-            upper=1e12,
-            starts=(0.15, 0.3),
-            search=(0.0, 2.0),
-        ),
-        amount(
-            "T_bwd",
-            "friction while x' is negative",
-            "drive",
-            upper=1e12,
-            starts=(0.05, 0.1),
-            search=(0.0, 2.0),
-        ),
+        amount("T_fwd", "friction while x' is positive", "drive", starts=(0.15, 0.3), search=(0.0, 2.0)),
+        amount("T_bwd", "friction while x' is negative", "drive", starts=(0.05, 0.1), search=(0.0, 2.0)),
     ),
-    energy=Energy.DISSIPATIVE,
     signature=Signature(gain_trend=GainTrend.RISES, even_harmonics=True),
     torque=T_fwd * (1 + sp.sign(v)) / 2 - T_bwd * (1 - sp.sign(v)) / 2,
     starts=(

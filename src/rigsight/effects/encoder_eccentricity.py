@@ -24,7 +24,7 @@ References: E. O. Doebelin, *Measurement Systems* (McGraw-Hill 2004), on shaft e
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import scale, signed
+from rigsight.effects.kinds import scale, signed
 from rigsight.effects.symbols import reading
 
 e_sin, e_cos, kappa = sp.symbols("e_sin e_cos kappa", real=True)
@@ -53,7 +53,7 @@ ENCODER_ECCENTRICITY = Effect(
             starts=(0.01, -0.02),
             search=(-0.3, 0.3),
         ),
-        scale("kappa", "wave number", "x^-1", lower=1e-9, upper=1e12, starts=(6.0, 15.0), search=(3.3, 60.0)),
+        scale("kappa", "wave number", "x^-1", starts=(6.0, 15.0), search=(3.3, 60.0)),
     ),
     energy=Energy.ACTIVE,
     wave_number="kappa",

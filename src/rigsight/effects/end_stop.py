@@ -19,7 +19,7 @@ References: S. W. Shaw and P. J. Holmes, J. Sound Vib. 90 (1983) 129.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.kinds import amount
 from rigsight.effects.symbols import beyond, x
 from rigsight.parameters import Parameter
 
@@ -31,9 +31,7 @@ END_STOP = Effect(
     family=Family.PLAY_AND_STOPS,
     summary="Beyond a clearance the mass meets a second, stiffer spring.",
     parameters=(
-        amount(
-            "k_s", "stiffness of the stop", "force x^-1", upper=1e18, starts=(1.0, 5.0), search=(0.0, 300.0)
-        ),
+        amount("k_s", "stiffness of the stop", "force x^-1", starts=(1.0, 5.0), search=(0.0, 300.0)),
         Parameter("s", "clearance", "x", lower=0.0, upper=1e9, starts=(0.7, 0.3, 1.1), search=(0.0, 3.0)),
     ),
     energy=Energy.CONSERVATIVE,

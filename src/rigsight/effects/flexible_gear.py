@@ -25,7 +25,7 @@ References: M. W. Spong, ASME J. Dyn. Syst. Meas. Control 109 (1987) 310, on fle
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
-from rigsight.effects.numbers import amount, scale
+from rigsight.effects.kinds import amount, scale
 from rigsight.effects.symbols import damped, driven, load, m, time_size, v, x
 
 r, w_a, zeta_a, s, s_rate = sp.symbols("r w_a zeta_a s s_rate", real=True)
@@ -53,7 +53,6 @@ FLEXIBLE_GEAR = Effect(
             "w_a",
             "angular frequency of the link",
             "time^-1",
-            lower=1e-9,
             upper=1e9,
             starts=(2.0, 4.0),
             search=(0.5, 50.0),

@@ -17,7 +17,7 @@ References: D. Tang, E. H. Dowell, AIAA J. 44 (2006), for free play in dynamic s
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.kinds import amount
 from rigsight.effects.symbols import beyond, x
 
 g = sp.Symbol("g", real=True)
@@ -27,9 +27,7 @@ FREE_PLAY = Effect(
     place=Place.DYNAMICS,
     family=Family.PLAY_AND_STOPS,
     summary="The spring has a gap around its rest position in which it does not act.",
-    parameters=(
-        amount("g", "half-width of the play", "x", upper=1e9, starts=(0.05, 0.3), search=(0.0, 2.0)),
-    ),
+    parameters=(amount("g", "half-width of the play", "x", starts=(0.05, 0.3), search=(0.0, 2.0)),),
     energy=Energy.CONSERVATIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),
     deflection=beyond(x, g),

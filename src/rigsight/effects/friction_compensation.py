@@ -18,20 +18,18 @@ References: B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083, section 4.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
-from rigsight.effects.numbers import amount
+from rigsight.effects.effect import GainTrend, Signature, State
+from rigsight.effects.kinds import amount, of_controller
 from rigsight.effects.symbols import clamp, command, output
 from rigsight.parameters import Parameter
 
 u_f, T_f, c_b, c_f = sp.symbols("u_f T_f c_b c_f", real=True)
 
-FRICTION_COMPENSATION = Effect(
+FRICTION_COMPENSATION = of_controller(
     name="friction_compensation",
-    place=Place.CONTROLLER,
-    family=Family.CONTROLLER,
     summary="The controller adds a constant in the direction of the goal.",
     parameters=(
-        amount("u_f", "what is added", "input", upper=1e300, starts=(0.02, 0.1), search=(0.0, 1.0)),
+        amount("u_f", "what is added", "input", starts=(0.02, 0.1), search=(0.0, 1.0)),
         Parameter(
             "T_f",
             "filter of the rate",
@@ -55,7 +53,6 @@ FRICTION_COMPENSATION = Effect(
             fitted=False,
         ),
     ),
-    energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),
     control=output + u_f * clamp(command - c_f, c_b) / c_b,
     states=(State(c_f, (command - c_f) / T_f, "input"),),

@@ -17,7 +17,7 @@ References: A. H. Nayfeh and D. T. Mook, *Nonlinear Oscillations* (Wiley 1979), 
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
-from rigsight.effects.numbers import signed
+from rigsight.effects.kinds import signed
 from rigsight.effects.symbols import k, x
 
 k_g, k_3 = sp.symbols("k_g k_3", real=True)

@@ -18,7 +18,7 @@ References: D. J. Ewins, *Modal Testing* (Research Studies Press 2000), on mass 
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.kinds import amount
 from rigsight.effects.symbols import acceleration
 
 m_e = sp.Symbol("m_e", real=True)
@@ -33,7 +33,6 @@ INERTIA = Effect(
             "m_e",
             "inertia that moves with the element",
             "force time^2 x^-1",
-            upper=1e12,
             starts=(0.1, 0.5),
             search=(0.0, 10.0),
         ),

@@ -16,7 +16,7 @@ References: H. K. Khalil, *Nonlinear Systems* (Prentice Hall 2002), section 1.2.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.kinds import amount
 from rigsight.effects.symbols import beyond, u
 
 u_0 = sp.Symbol("u_0", real=True)
@@ -27,9 +27,7 @@ INPUT_DEAD_ZONE = Effect(
     family=Family.DRIVE_LIMIT,
     summary="Small drive inputs have no effect.",
     parameters=(
-        amount(
-            "u_0", "half-width of the dead zone", "input", upper=1e300, starts=(0.05, 0.2), search=(0.0, 2.0)
-        ),
+        amount("u_0", "half-width of the dead zone", "input", starts=(0.05, 0.2), search=(0.0, 2.0)),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.RISES),

@@ -16,18 +16,15 @@ References: L. Ljung, *System Identification* (Prentice Hall 1999), section 4.2.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.effect import Place
+from rigsight.effects.kinds import amount, late
 
 T_d = sp.Symbol("T_d", real=True)
 
-INPUT_DELAY = Effect(
+INPUT_DELAY = late(
     name="input_delay",
     place=Place.ACTUATOR,
-    family=Family.DELAY_OR_LAG,
     summary="The drive acts later than commanded.",
-    parameters=(amount("T_d", "dead time", "time", upper=1e6, starts=(0.05, 0.2), search=(0.0, 3.0)),),
-    energy=Energy.ACTIVE,
-    signature=Signature(gain_trend=GainTrend.STEADY),
+    parameters=(amount("T_d", "dead time", "time", starts=(0.05, 0.2), search=(0.0, 3.0)),),
     delay=T_d,
 )

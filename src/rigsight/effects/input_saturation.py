@@ -16,7 +16,7 @@ References: H. K. Khalil, *Nonlinear Systems* (Prentice Hall 2002), section 1.2.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import limit
+from rigsight.effects.kinds import limit
 from rigsight.effects.symbols import clamp, u
 
 u_max = sp.Symbol("u_max", real=True)

@@ -18,29 +18,18 @@ References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), cha
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
-from rigsight.effects.numbers import amount
+from rigsight.effects.effect import State
+from rigsight.effects.kinds import amount, of_controller
 from rigsight.effects.symbols import error, output
 
 r_i, z = sp.symbols("r_i z", real=True)
 
-INTEGRAL_ACTION = Effect(
+INTEGRAL_ACTION = of_controller(
     name="integral_action",
-    place=Place.CONTROLLER,
-    family=Family.CONTROLLER,
     summary="The controller integrates its error.",
     parameters=(
-        amount(
-            "r_i",
-            "reciprocal of the integral time",
-            "time^-1",
-            upper=1e12,
-            starts=(0.1, 0.3),
-            search=(0.0, 20.0),
-        ),
+        amount("r_i", "reciprocal of the integral time", "time^-1", starts=(0.1, 0.3), search=(0.0, 20.0)),
     ),
-    energy=Energy.ACTIVE,
-    signature=Signature(gain_trend=GainTrend.STEADY),
     control=output + z,
     states=(State(z, r_i * error, "input"),),
 )

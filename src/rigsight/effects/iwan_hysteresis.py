@@ -26,7 +26,7 @@ F. Al-Bender, V. Lampaert and J. Swevers, IEEE Trans. Autom. Control 50 (2005) 1
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
-from rigsight.effects.numbers import scale
+from rigsight.effects.kinds import scale
 from rigsight.effects.symbols import deflection_rate, k, spring_torque, x_size
 from rigsight.parameters import Parameter
 
@@ -86,13 +86,7 @@ IWAN_HYSTERESIS = Effect(
             search=(0.0, 1.0),
         ),
         scale(
-            "x_s",
-            "deflection at which nearly all elements slip",
-            "x",
-            lower=1e-12,
-            upper=1e9,
-            starts=(0.5, 2.0),
-            search=(1e-2, 1e2),
+            "x_s", "deflection at which nearly all elements slip", "x", starts=(0.5, 2.0), search=(1e-2, 1e2)
         ),
         Parameter(
             "q",

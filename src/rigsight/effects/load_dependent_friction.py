@@ -27,23 +27,19 @@ model M3; P. Hamon, M. Gautier and P. Garrec, IEEE/RSJ IROS (2010) 6187, on fric
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
-from rigsight.effects.numbers import amount
+from rigsight.effects.effect import Start
+from rigsight.effects.kinds import amount, dry_friction
 from rigsight.effects.symbols import drive_size, load, v
 
 T_c, mu = sp.symbols("T_c mu", real=True)
 
-LOAD_DEPENDENT_FRICTION = Effect(
+LOAD_DEPENDENT_FRICTION = dry_friction(
     name="load_dependent_friction",
-    place=Place.DYNAMICS,
-    family=Family.DRY_FRICTION,
     summary="Dry friction grows with the load that the joint carries.",
     parameters=(
-        amount("T_c", "friction without load", "drive", upper=1e12, starts=(0.05, 0.1), search=(0.0, 2.0)),
-        amount("mu", "friction per load", "", upper=1.0, starts=(0.1, 0.2), search=(0.0, 1.0)),
+        amount("T_c", "friction without load", "drive", starts=(0.05, 0.1), search=(0.0, 2.0)),
+        amount("mu", "friction per load", "", starts=(0.1, 0.2), search=(0.0, 1.0)),
     ),
-    energy=Energy.DISSIPATIVE,
-    signature=Signature(gain_trend=GainTrend.RISES),
     torque=(T_c + mu * sp.Abs(load)) * sp.sign(v),
     starts=(
         Start({"T_c": 0.05 * drive_size, "mu": sp.Float(0.1)}),

@@ -23,28 +23,19 @@ model M4 with one ratio of the two levels.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
-from rigsight.effects.numbers import amount, scale
+from rigsight.effects.effect import Start
+from rigsight.effects.kinds import amount, dry_friction, scale
 from rigsight.effects.symbols import drive_size, load, v, v_size
 from rigsight.parameters import Parameter
 
 T_c, mu, s, w_s = sp.symbols("T_c mu s w_s", real=True)
 
-LOAD_DEPENDENT_STRIBECK_FRICTION = Effect(
+LOAD_DEPENDENT_STRIBECK_FRICTION = dry_friction(
     name="load_dependent_stribeck_friction",
-    place=Place.DYNAMICS,
-    family=Family.DRY_FRICTION,
     summary="Dry friction grows with the load of the joint, and is larger at standstill.",
     parameters=(
-        amount(
-            "T_c",
-            "friction at high speed without load",
-            "drive",
-            upper=1e12,
-            starts=(0.05, 0.1),
-            search=(0.0, 2.0),
-        ),
-        amount("mu", "friction per load", "", upper=1.0, starts=(0.1, 0.2), search=(0.0, 0.5)),
+        amount("T_c", "friction at high speed without load", "drive", starts=(0.05, 0.1), search=(0.0, 2.0)),
+        amount("mu", "friction per load", "", starts=(0.1, 0.2), search=(0.0, 0.5)),
         Parameter(
             "s",
             "excess at standstill over high speed",
@@ -54,18 +45,8 @@ LOAD_DEPENDENT_STRIBECK_FRICTION = Effect(
             starts=(0.5, 1.0),
             search=(0.02, 3.0),
         ),
-        scale(
-            "w_s",
-            "Stribeck velocity",
-            "x time^-1",
-            lower=1e-12,
-            upper=1e12,
-            starts=(0.1, 0.02),
-            search=(1e-3, 3.0),
-        ),
+        scale("w_s", "Stribeck velocity", "x time^-1", starts=(0.1, 0.02), search=(1e-3, 3.0)),
     ),
-    energy=Energy.DISSIPATIVE,
-    signature=Signature(gain_trend=GainTrend.RISES),
     torque=(T_c + mu * sp.Abs(load)) * (1 + s * sp.exp(-((v / w_s) ** 2))) * sp.sign(v),
     starts=(
         Start({"T_c": 0.05 * drive_size, "mu": sp.Float(0.1), "s": sp.Float(0.5), "w_s": 0.1 * v_size}),

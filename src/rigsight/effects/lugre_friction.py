@@ -24,8 +24,8 @@ References: C. Canudas de Wit et al., IEEE TAC 40 (1995) 419.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
-from rigsight.effects.numbers import amount, scale
+from rigsight.effects.effect import Start, State
+from rigsight.effects.kinds import amount, dry_friction, scale
 from rigsight.effects.symbols import drive_size, v, v_size, x_size
 from rigsight.parameters import Parameter
 
@@ -33,13 +33,11 @@ T_c, T_s, s, w_s, x_p, z = sp.symbols("T_c T_s s w_s x_p z", real=True)
 
 _level = 1 + s * sp.exp(-((v / w_s) ** 2))
 
-LUGRE_FRICTION = Effect(
+LUGRE_FRICTION = dry_friction(
     name="lugre_friction",
-    place=Place.DYNAMICS,
-    family=Family.DRY_FRICTION,
     summary="Dry friction deflects like a spring before it slides, and falls with speed.",
     parameters=(
-        amount("T_c", "friction at high speed", "drive", upper=1e12, starts=(0.1, 0.3), search=(0.0, 2.0)),
+        amount("T_c", "friction at high speed", "drive", starts=(0.1, 0.3), search=(0.0, 2.0)),
         Parameter(
             "s",
             "excess at standstill over high speed",
@@ -49,27 +47,15 @@ LUGRE_FRICTION = Effect(
             starts=(0.5, 1.0),
             search=(0.02, 3.0),
         ),
-        scale(
-            "w_s",
-            "Stribeck velocity",
-            "x time^-1",
-            lower=1e-12,
-            upper=1e12,
-            starts=(0.1, 0.3),
-            search=(1e-3, 0.5),
-        ),
+        scale("w_s", "Stribeck velocity", "x time^-1", starts=(0.1, 0.3), search=(1e-3, 0.5)),
         scale(
             "x_p",
             "displacement over which the friction builds up",
             "x",
-            lower=1e-12,
-            upper=1e9,
             starts=(0.1, 0.03),
             search=(1e-3, 0.2),
         ),
     ),
-    energy=Energy.DISSIPATIVE,
-    signature=Signature(gain_trend=GainTrend.RISES),
     torque=T_c * (1 + s) * z / x_p,
     states=(State(z, v - sp.Abs(v) * z * (1 + s) / (x_p * _level), "x"),),
     starts=(

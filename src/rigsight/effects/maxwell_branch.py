@@ -23,7 +23,7 @@ References: J. D. Ferry, *Viscoelastic Properties of Polymers* (Wiley 1980), cha
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
-from rigsight.effects.numbers import amount, scale
+from rigsight.effects.kinds import amount, scale
 from rigsight.effects.symbols import drive_size, time_size, v, x_size
 
 k_m, tau_m, q = sp.symbols("k_m tau_m q", real=True)
@@ -40,12 +40,8 @@ MAXWELL_BRANCH = Effect(
     family=Family.VISCOELASTICITY,
     summary="A second spring in series with a damper acts in parallel to the spring and relaxes.",
     parameters=(
-        amount(
-            "k_m", "stiffness of the branch", "force x^-1", upper=1e18, starts=(0.3, 0.8), search=(0.0, 10.0)
-        ),
-        scale(
-            "tau_m", "relaxation time", "time", lower=1e-9, upper=1e9, starts=(1.0, 3.0), search=(0.01, 100.0)
-        ),
+        amount("k_m", "stiffness of the branch", "force x^-1", starts=(0.3, 0.8), search=(0.0, 10.0)),
+        scale("tau_m", "relaxation time", "time", upper=1e9, starts=(1.0, 3.0), search=(0.01, 100.0)),
     ),
     energy=Energy.DISSIPATIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),

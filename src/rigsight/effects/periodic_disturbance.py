@@ -20,7 +20,7 @@ References: L. Ljung, *System Identification* (Prentice Hall 1999), on periodic 
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
-from rigsight.effects.numbers import scale, signed
+from rigsight.effects.kinds import scale, signed
 
 T_p, w_p, phi = sp.symbols("T_p w_p phi", real=True)
 
@@ -31,15 +31,7 @@ PERIODIC_DISTURBANCE = Effect(
     summary="An external torque is periodic in time, independent of the drive.",
     parameters=(
         signed("T_p", "amplitude", "drive", lower=-1e15, upper=1e15, starts=(0.05,), search=(0.0, 2.0)),
-        scale(
-            "w_p",
-            "angular frequency",
-            "time^-1",
-            lower=1e-9,
-            upper=1e9,
-            starts=(2.0, 0.8),
-            search=(0.02, 50.0),
-        ),
+        scale("w_p", "angular frequency", "time^-1", upper=1e9, starts=(2.0, 0.8), search=(0.02, 50.0)),
     ),
     energy=Energy.ACTIVE,
     pulsation="w_p",

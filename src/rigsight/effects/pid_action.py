@@ -20,31 +20,20 @@ References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), cha
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
-from rigsight.effects.numbers import amount, scale
+from rigsight.effects.effect import Start, State
+from rigsight.effects.kinds import amount, of_controller, scale
 from rigsight.effects.symbols import error, output, time_size
 
 r_i, T_v, T_f, z, e_f = sp.symbols("r_i T_v T_f z e_f", real=True)
 
-PID_ACTION = Effect(
+PID_ACTION = of_controller(
     name="pid_action",
-    place=Place.CONTROLLER,
-    family=Family.CONTROLLER,
     summary="The controller integrates its error and reacts to the rate of it.",
     parameters=(
-        amount(
-            "r_i",
-            "reciprocal of the integral time",
-            "time^-1",
-            upper=1e12,
-            starts=(0.1, 0.3),
-            search=(0.0, 20.0),
-        ),
-        amount("T_v", "derivative time", "time", upper=1e6, starts=(0.05, 0.3), search=(0.0, 3.0)),
-        scale("T_f", "filter of the rate", "time", lower=1e-9, upper=1e6, starts=(0.02,), search=(1e-3, 0.3)),
+        amount("r_i", "reciprocal of the integral time", "time^-1", starts=(0.1, 0.3), search=(0.0, 20.0)),
+        amount("T_v", "derivative time", "time", starts=(0.05, 0.3), search=(0.0, 3.0)),
+        scale("T_f", "filter of the rate", "time", starts=(0.02,), search=(1e-3, 0.3)),
     ),
-    energy=Energy.ACTIVE,
-    signature=Signature(gain_trend=GainTrend.STEADY),
     control=output + z + T_v * (error - e_f) / T_f,
     states=(State(z, r_i * error, "input"), State(e_f, (error - e_f) / T_f, "input")),
     starts=(

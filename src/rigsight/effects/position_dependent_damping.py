@@ -18,7 +18,7 @@ van der Pol equation has its negative.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.kinds import amount
 from rigsight.effects.symbols import v, x
 
 c_x = sp.Symbol("c_x", real=True)
@@ -30,12 +30,7 @@ POSITION_DEPENDENT_DAMPING = Effect(
     summary="Damping that grows with the square of the displacement.",
     parameters=(
         amount(
-            "c_x",
-            "damping per squared displacement",
-            "force time x^-3",
-            upper=1e18,
-            starts=(0.3, 3.0),
-            search=(0.0, 1e3),
+            "c_x", "damping per squared displacement", "force time x^-3", starts=(0.3, 3.0), search=(0.0, 1e3)
         ),
     ),
     energy=Energy.DISSIPATIVE,

@@ -21,7 +21,7 @@ References: K. L. Johnson, *Contact Mechanics* (Cambridge 1985), chapter 4, for 
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
-from rigsight.effects.numbers import signed
+from rigsight.effects.kinds import signed
 from rigsight.effects.symbols import drive_size, x, x_size
 from rigsight.parameters import Parameter
 

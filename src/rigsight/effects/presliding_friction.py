@@ -25,31 +25,25 @@ References: P. R. Dahl, *A Solid Friction Model* (Aerospace Corporation TOR-0158
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
-from rigsight.effects.numbers import amount, scale
+from rigsight.effects.effect import Start, State
+from rigsight.effects.kinds import amount, dry_friction, scale
 from rigsight.effects.symbols import drive_size, v, x_size
 
 T_c, x_p, z = sp.symbols("T_c x_p z", real=True)
 
-PRESLIDING_FRICTION = Effect(
+PRESLIDING_FRICTION = dry_friction(
     name="presliding_friction",
-    place=Place.DYNAMICS,
-    family=Family.DRY_FRICTION,
     summary="Dry friction deflects like a spring before it slides.",
     parameters=(
-        amount("T_c", "friction once it slides", "drive", upper=1e12, starts=(0.1, 0.3), search=(0.0, 2.0)),
+        amount("T_c", "friction once it slides", "drive", starts=(0.1, 0.3), search=(0.0, 2.0)),
         scale(
             "x_p",
             "displacement over which the friction builds up",
             "x",
-            lower=1e-12,
-            upper=1e9,
             starts=(0.1, 0.3),
             search=(1e-3, 10.0),
         ),
     ),
-    energy=Energy.DISSIPATIVE,
-    signature=Signature(gain_trend=GainTrend.RISES),
     torque=T_c * z / x_p,
     states=(State(z, v - sp.Abs(v) * z / x_p, "x"),),
     starts=(

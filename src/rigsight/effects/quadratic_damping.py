@@ -16,7 +16,7 @@ References: K. Worden and G. R. Tomlinson, *Nonlinearity in Structural Dynamics*
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.kinds import amount
 from rigsight.effects.symbols import v
 
 c_2 = sp.Symbol("c_2", real=True)
@@ -27,9 +27,7 @@ QUADRATIC_DAMPING = Effect(
     family=Family.DAMPING_LAW,
     summary="Damping that grows with the square of the speed (fluid drag).",
     parameters=(
-        amount(
-            "c_2", "drag coefficient", "force time^2 x^-2", upper=1e15, starts=(0.1, 1.0), search=(0.0, 1e3)
-        ),
+        amount("c_2", "drag coefficient", "force time^2 x^-2", starts=(0.1, 1.0), search=(0.0, 1e3)),
     ),
     energy=Energy.DISSIPATIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),

@@ -18,7 +18,7 @@ pulse counter that is insensitive to the direction.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.kinds import amount
 from rigsight.effects.symbols import reading
 
 r = sp.Symbol("r", real=True)
@@ -28,9 +28,7 @@ RECTIFIED_SENSOR = Effect(
     place=Place.SENSOR,
     family=Family.SENSOR,
     summary="The sensor shows the magnitude and not the sign.",
-    parameters=(
-        amount("r", "share of the rectified reading", "", upper=1.0, starts=(0.9, 0.5), search=(0.0, 1.0)),
-    ),
+    parameters=(amount("r", "share of the rectified reading", "", starts=(0.9, 0.5), search=(0.0, 1.0)),),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY, even_harmonics=True),
     measured=(1 - r) * reading + r * sp.Abs(reading),

@@ -17,18 +17,15 @@ References: K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems* (Prent
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.effect import Place
+from rigsight.effects.kinds import amount, late
 
 T_s = sp.Symbol("T_s", real=True)
 
-SENSOR_DELAY = Effect(
+SENSOR_DELAY = late(
     name="sensor_delay",
     place=Place.SENSOR,
-    family=Family.DELAY_OR_LAG,
     summary="The displacement is measured with a delay.",
-    parameters=(amount("T_s", "dead time", "time", upper=1e6, starts=(0.05, 0.2), search=(0.0, 3.0)),),
-    energy=Energy.ACTIVE,
-    signature=Signature(gain_trend=GainTrend.STEADY),
+    parameters=(amount("T_s", "dead time", "time", starts=(0.05, 0.2), search=(0.0, 3.0)),),
     reading_delay=T_s,
 )

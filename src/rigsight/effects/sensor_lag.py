@@ -16,30 +16,19 @@ References: E. O. Doebelin, *Measurement Systems* (McGraw-Hill 2004), on first-o
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
-from rigsight.effects.numbers import amount
+from rigsight.effects.effect import Place, State
+from rigsight.effects.kinds import amount, late
 from rigsight.effects.symbols import reading
 
 T_m, x_m = sp.symbols("T_m x_m", real=True)
 
-SENSOR_LAG = Effect(
+SENSOR_LAG = late(
     name="sensor_lag",
     place=Place.SENSOR,
-    family=Family.DELAY_OR_LAG,
     summary="The displacement is measured through a first-order lag.",
     parameters=(
-        amount(
-            "T_m",
-            "time constant",
-            "time",
-            upper=1e6,
-            starts=(0.05, 0.3),
-            search=(1e-3, 10.0),
-            logarithmic=True,
-        ),
+        amount("T_m", "time constant", "time", starts=(0.05, 0.3), search=(1e-3, 10.0), logarithmic=True),
     ),
-    energy=Energy.ACTIVE,
-    signature=Signature(gain_trend=GainTrend.STEADY),
     measured=x_m,
     states=(State(x_m, (reading - x_m) / T_m, "x"),),
 )

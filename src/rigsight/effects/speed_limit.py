@@ -21,7 +21,7 @@ References: A. Hughes and B. Drury, *Electric Motors and Drives* (Newnes 2013), 
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
-from rigsight.effects.numbers import limit
+from rigsight.effects.kinds import limit
 from rigsight.effects.symbols import beyond, input_size, u, v, v_size
 from rigsight.parameters import Parameter
 

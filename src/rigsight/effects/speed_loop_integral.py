@@ -19,29 +19,18 @@ References: H. Gross, J. Hamann and G. Wiegartner, *Electrical Feed Drives in Au
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
-from rigsight.effects.numbers import amount
+from rigsight.effects.effect import State
+from rigsight.effects.kinds import amount, of_controller
 from rigsight.effects.symbols import output
 
 r_v, z = sp.symbols("r_v z", real=True)
 
-SPEED_LOOP_INTEGRAL = Effect(
+SPEED_LOOP_INTEGRAL = of_controller(
     name="speed_loop_integral",
-    place=Place.CONTROLLER,
-    family=Family.CONTROLLER,
     summary="A speed loop inside the position loop integrates.",
     parameters=(
-        amount(
-            "r_v",
-            "reciprocal of the integral time",
-            "time^-1",
-            upper=1e12,
-            starts=(0.3, 0.1),
-            search=(0.0, 50.0),
-        ),
+        amount("r_v", "reciprocal of the integral time", "time^-1", starts=(0.3, 0.1), search=(0.0, 50.0)),
     ),
-    energy=Energy.ACTIVE,
-    signature=Signature(gain_trend=GainTrend.STEADY),
     control=output + z,
     states=(State(z, r_v * output, "input"),),
 )

@@ -22,39 +22,20 @@ References: B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
-from rigsight.effects.numbers import amount, scale
+from rigsight.effects.effect import Start
+from rigsight.effects.kinds import amount, dry_friction, scale
 from rigsight.effects.symbols import drive_size, v, v_size
 
 T_c, T_s, w_s = sp.symbols("T_c T_s w_s", real=True)
 
-STRIBECK_FRICTION = Effect(
+STRIBECK_FRICTION = dry_friction(
     name="stribeck_friction",
-    place=Place.DYNAMICS,
-    family=Family.DRY_FRICTION,
     summary="Dry friction that is larger at standstill and falls with speed.",
     parameters=(
-        amount(
-            "T_c",
-            "Coulomb friction at high speed",
-            "drive",
-            upper=1e12,
-            starts=(0.05, 0.2),
-            search=(0.0, 2.0),
-        ),
-        amount("T_s", "friction at standstill", "drive", upper=1e12, starts=(0.1, 0.4), search=(0.0, 4.0)),
-        scale(
-            "w_s",
-            "Stribeck velocity",
-            "x time^-1",
-            lower=1e-12,
-            upper=1e12,
-            starts=(0.1, 0.02),
-            search=(1e-3, 3.0),
-        ),
+        amount("T_c", "Coulomb friction at high speed", "drive", starts=(0.05, 0.2), search=(0.0, 2.0)),
+        amount("T_s", "friction at standstill", "drive", starts=(0.1, 0.4), search=(0.0, 4.0)),
+        scale("w_s", "Stribeck velocity", "x time^-1", starts=(0.1, 0.02), search=(1e-3, 3.0)),
     ),
-    energy=Energy.DISSIPATIVE,
-    signature=Signature(gain_trend=GainTrend.RISES),
     ordered=(("T_s", "T_c"),),
     torque=(T_c + (T_s - T_c) * sp.exp(-((v / w_s) ** 2))) * sp.sign(v),
     starts=(

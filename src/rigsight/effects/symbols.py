@@ -6,6 +6,7 @@ events and so keeps its full order across them.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import sympy as sp
@@ -117,6 +118,12 @@ def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
         .replace(_RealSign, sp.sign)
         .replace(_RealAbs, sp.Abs)
     )
+
+
+def rate_along(expression: sp.Expr, rates: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
+    """Return the time derivative of an expression, in which symbols change with the given rates."""
+    present = [symbol for symbol in rates if symbol in expression.free_symbols]
+    return sp.Add(*(derivative(expression, symbol) * rates[symbol] for symbol in present))
 
 
 def beyond(expression: sp.Expr, half_width: sp.Expr) -> sp.Expr:

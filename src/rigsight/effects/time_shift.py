@@ -19,16 +19,15 @@ References: L. Ljung, *System Identification* (Prentice Hall 1999), section 4.2.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
-from rigsight.effects.numbers import signed
+from rigsight.effects.effect import Place, Start
+from rigsight.effects.kinds import late, signed
 from rigsight.effects.symbols import time_size
 
 T_x = sp.Symbol("T_x", real=True)
 
-TIME_SHIFT = Effect(
+TIME_SHIFT = late(
     name="time_shift",
     place=Place.SENSOR,
-    family=Family.DELAY_OR_LAG,
     summary="The time stamps of one signal are early or late relative to the others.",
     parameters=(
         signed(
@@ -41,8 +40,6 @@ TIME_SHIFT = Effect(
             search=(-1.0, 1.0),
         ),
     ),
-    energy=Energy.ACTIVE,
-    signature=Signature(gain_trend=GainTrend.STEADY),
     reading_delay=T_x,
     # A fit finds from one wave of the record to the next one only.
     starts=tuple(Start({"T_x": share * time_size}) for share in (-0.6, -0.1, 0.1, 0.6)),

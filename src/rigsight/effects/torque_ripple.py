@@ -25,7 +25,7 @@ References: T. M. Jahns and W. L. Soong, IEEE Trans. Ind. Electron. 43 (1996) 32
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import scale, signed
+from rigsight.effects.kinds import scale, signed
 from rigsight.effects.symbols import position
 
 T_sin, T_cos, kappa = sp.symbols("T_sin T_cos kappa", real=True)
@@ -54,7 +54,7 @@ TORQUE_RIPPLE = Effect(
             starts=(0.05, -0.1),
             search=(-2.0, 2.0),
         ),
-        scale("kappa", "wave number", "x^-1", lower=1e-9, upper=1e12, starts=(6.0, 15.0), search=(3.3, 60.0)),
+        scale("kappa", "wave number", "x^-1", starts=(6.0, 15.0), search=(3.3, 60.0)),
     ),
     energy=Energy.CONSERVATIVE,
     wave_number="kappa",

@@ -16,30 +16,25 @@ References: G. Ellis, *Control System Design Guide* (Elsevier 2012), chapter 8.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
-from rigsight.effects.numbers import amount, scale
+from rigsight.effects.effect import State
+from rigsight.effects.kinds import amount, of_controller, scale
 from rigsight.effects.symbols import command, output
 
 T_w, T_f, c_f = sp.symbols("T_w T_f c_f", real=True)
 
-VELOCITY_FEEDFORWARD = Effect(
+VELOCITY_FEEDFORWARD = of_controller(
     name="velocity_feedforward",
-    place=Place.CONTROLLER,
-    family=Family.CONTROLLER,
     summary="The controller adds the commanded velocity.",
     parameters=(
         amount(
             "T_w",
             "gain of the velocity over that of the position",
             "time",
-            upper=1e6,
             starts=(0.05, 0.3),
             search=(0.0, 3.0),
         ),
-        scale("T_f", "filter of the rate", "time", lower=1e-9, upper=1e6, starts=(0.02,), search=(1e-3, 0.3)),
+        scale("T_f", "filter of the rate", "time", starts=(0.02,), search=(1e-3, 0.3)),
     ),
-    energy=Energy.ACTIVE,
-    signature=Signature(gain_trend=GainTrend.STEADY),
     control=output + T_w * (command - c_f) / T_f,
     states=(State(c_f, (command - c_f) / T_f, "input"),),
 )

@@ -95,10 +95,7 @@ def c_source(exported: Exported, source: str, name: str) -> str:
         "REST_CALL": "    (void)p; (void)u;\n"
         if exported.rest is None
         else parts["BALANCE_CALL" if isinstance(exported.rest, Balance) else "REST_CALL"],
-        "DEFAULTS": "\n".join(
-            f"    p->{q.name} = {value!r};"
-            for q, value in zip(exported.parameters, exported.values, strict=True)
-        ),
+        "DEFAULTS": "\n".join(f"    p->{q.name} = {value!r};" for q, value in exported.numbers),
         "REMEMBER_FIRST": ("    memcpy(m->first, u, sizeof m->first);\n" if delayed else "")
         + ("    remember(m);\n    memcpy(m->origin, m->readings[0], sizeof m->origin);\n" if late else ""),
         "CUBIC": parts["CUBICS"] if exported.follows_motion else "",
@@ -154,28 +151,21 @@ def _rest(exported: Exported, names: Mapping[sp.Symbol, str]) -> str:
     if rest is None:
         return ""
     values = C.statements(["x[0]", "inertia", "stiffness"], rest.expressions, names)
-    return filled(
-        template_parts("export", "model_parts.c.txt")["REST"],
-        {
-            "INTERVALS": INTERVALS,
-            "WAITS": WAITS,
-            "TOLERANCE": TOLERANCE,
-            "SETTLED": SETTLED,
-            "RAMP": RAMP_PERIODS,
-            "VALUES": indented(values),
-            "DAMPING": rest.damping,
-            "SILENCED": "".join(f"        quiet.{name} = 0.0;\n" for name in rest.silenced),
-        },
-    )
+    silenced = "".join(f"        quiet.{name} = 0.0;\n" for name in rest.silenced)
+    own = {"VALUES": indented(values), "DAMPING": rest.damping, "SILENCED": silenced}
+    fixed = {
+        "INTERVALS": INTERVALS,
+        "WAITS": WAITS,
+        "TOLERANCE": TOLERANCE,
+        "SETTLED": SETTLED,
+        "RAMP": RAMP_PERIODS,
+    }
+    return filled(template_parts("export", "model_parts.c.txt")["REST"], {**fixed, **own})
 
 
 def _balance(exported: Exported, rest: Balance, parameters: Mapping[sp.Symbol, str]) -> str:
-    states = exported.structure.states
-    names = {
-        **parameters,
-        **{symbol: f"x[{i}]" for i, symbol in enumerate(states)},
-        **{input_symbols(i)[0]: f"u[{at}]" for i, at in enumerate(_places(exported))},
-    }
+    names = dict(parameters) | {symbol: f"x[{i}]" for i, symbol in enumerate(exported.structure.states)}
+    names |= {input_symbols(i)[0]: f"u[{at}]" for i, at in enumerate(_places(exported))}
     targets = [f"r[{i}]" for i in range(len(rest.residuals))]
     targets += [f"s[{i}]" for i in range(len(rest.unknown) ** 2)]
     starts = C.statements([f"x[{i}]" for i in rest.start], list(rest.start.values()), names)

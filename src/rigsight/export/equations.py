@@ -84,17 +84,9 @@ class Source:
 class Rest:
     """What the static equilibrium of one mass at the first input is found with; expressions of parameters."""
 
-    # Rest position, inertia and stiffness of the moving mass.
-    displacement: sp.Expr
-    inertia: sp.Expr
-    stiffness: sp.Expr
+    expressions: list[sp.Expr]  # rest position, inertia and stiffness of the moving mass
     damping: str  # name of the damping parameter, raised to the critical value on the way to rest
     silenced: tuple[str, ...]  # names of the parameters of disturbances, zero on the way to rest
-
-    @property
-    def expressions(self) -> list[sp.Expr]:
-        """Rest position, inertia and stiffness."""
-        return [self.displacement, self.inertia, self.stiffness]
 
 
 @dataclass(frozen=True)
@@ -126,9 +118,19 @@ class Exported:
         return any(source.rate is not None for source in self.sources)
 
     @property
+    def numbers(self) -> tuple[tuple[Quantity, float], ...]:
+        """The parameters with their numbers."""
+        return tuple(zip(self.parameters, self.values, strict=True))
+
+    @property
     def frictions(self) -> tuple[int, ...]:
         """Indices of the modes that are signs of velocities which dry friction can hold at zero."""
         return tuple(friction.mode for friction in self.frozen.frictions)
+
+    @property
+    def friction(self) -> int | None:
+        """The first of them; None without dry friction."""
+        return self.frictions[0] if self.frictions else None
 
     @property
     def limits(self) -> dict[int, sp.Expr]:
@@ -192,11 +194,10 @@ def exported(
 
 
 def _sources(rig: Rig, names: _Names, of_inputs: Set[str]) -> tuple[Source, ...]:
-    prescribing = {coordinate.prescribed_by for coordinate in rig.mechanism.prescribed}
     found = []
     for signal in rig.inputs:
         value, rate = names.quantity(signal.name, signal.unit, signal.description, of_inputs), None
-        if signal.name in prescribing:
+        if signal.name in rig.mechanism.prescribing:
             about = f"rate of {signal.name}"
             rate = names.quantity(f"{signal.name}_rate", f"{signal.unit}/s", about, of_inputs)
         found.append(Source(value, rate))
@@ -221,17 +222,10 @@ def _rest(structure: Structure, names: dict[str, str]) -> Rest | Balance | None:
     motion = structure.rig.motion
     if motion.inertia is None:
         return None
-    bound = dict(zip(structure.names, structure.parameter_symbols, strict=True))
-
-    def of_parameters(expression: sp.Expr) -> sp.Expr:
-        return expression.xreplace({s: bound[s.name] for s in expression.free_symbols})
-
     disturbances = [effect for effect in structure.effects if effect.place is Place.DISTURBANCE]
     pushing = [structure.parameter_name(effect, p.name) for effect in disturbances for p in effect.parameters]
     return Rest(
-        displacement=of_parameters(motion.rest),
-        inertia=of_parameters(motion.inertia),
-        stiffness=of_parameters(motion.stiffness),
+        [structure.of_rig(own) for own in (motion.rest, motion.inertia, motion.stiffness)],
         damping=names[motion.damping.name],
         silenced=tuple(names[name] for name in pushing if name in names),
     )
@@ -294,12 +288,8 @@ def balance(structure: Structure) -> Balance | None:
     states = structure.states
     if not states:
         return None
-    own = dict(zip(structure.names, structure.parameter_symbols, strict=True))
-    start = {
-        states.index(symbol): value.xreplace({s: own[s.name] for s in value.free_symbols})
-        for symbol, value in structure.rig.mechanism.initial.items()
-        if symbol in states
-    }
+    initial = structure.rig.mechanism.initial.items()
+    start = {states.index(symbol): structure.of_rig(own) for symbol, own in initial if symbol in states}
     before = [start.get(i, sp.S.Zero) for i in range(len(states))]
     residuals, memories = residuals_at_rest(structure, before, clamp)
     unknown = tuple(i for i in residuals if i not in start)

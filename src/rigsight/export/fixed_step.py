@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import sympy as sp
 
-from rigsight.effects.symbols import derivative
+from rigsight.effects.symbols import derivative, rate_along
+from rigsight.export.description import hold_text
 from rigsight.export.equations import Exported
 from rigsight.records.record import Floats
 from rigsight.rigs import evaluated
@@ -17,7 +18,7 @@ from rigsight.simulate import parameter_vector, rest_state
 from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.simulate.equations.kinks import FrozenStructure, freeze
 from rigsight.simulate.equations.straight_line import straight_line
-from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
+from rigsight.simulate.equations.structure import TIME, Structure, input_rates, input_symbols
 from rigsight.simulate.input_hold import HeldInput, hold_input, together
 from rigsight.simulate.model import Model
 
@@ -29,6 +30,10 @@ LONGEST = 1e9
 """Step of a model without motion of its own [s]: the sample time alone decides."""
 CAUTION = 0.4
 """Share of that step for nonlinear equations, whose time scales grow shorter with the motion."""
+MIN_STEPS = 4
+"""Steps per sample of a model with kinks or products, whose time scales depend on the motion."""
+MIN_STEPS_PRESCRIBED = 32
+"""The same if the motion is prescribed: the model has no time scale that requires more."""
 _NUDGE = 1e-6
 
 
@@ -42,10 +47,10 @@ def internal_step(model: Model) -> float:
     p = parameter_vector(structure, values)
     frozen = freeze(structure)
     rates = _rates(structure, frozen, p)
-    inputs = _input_symbols(structure)
-    rest, still = _rest(structure, p), np.zeros(len(inputs))
-    step = LONGEST
-    for modes in _sides(frozen):
+    rest, still = _rest(structure, p), np.zeros(len(_input_symbols(structure)))
+    step, n_modes = LONGEST, len(frozen.modes)
+    one_turned = np.vstack([np.ones(n_modes), np.ones((n_modes, n_modes)) - 2.0 * np.eye(n_modes)])
+    for modes in (*one_turned, *-one_turned):
         jacobian = np.zeros((rest.size, rest.size))
         for i in range(rest.size):
             ahead, behind = rest.copy(), rest.copy()
@@ -107,12 +112,6 @@ def _rest(structure: Structure, p: Floats) -> Floats:
     return rest
 
 
-def _sides(frozen: FrozenStructure) -> Iterator[Floats]:
-    count = len(frozen.modes)
-    one_turned = np.vstack([np.ones(count), np.ones((count, count)) - 2.0 * np.eye(count)])
-    yield from (*one_turned, *-one_turned)
-
-
 def _of_eigenvalues(jacobian: Floats) -> float:
     if not np.all(np.isfinite(jacobian)):
         return LONGEST
@@ -166,7 +165,10 @@ def equations_of(exported: Exported) -> IntegratorEquations:
     def walk(expression: sp.Expr) -> sp.Expr:
         if not expression.args:
             return expression
-        if expression.free_symbols and expression.free_symbols <= fixed and _costly(expression):
+        costly = bool(expression.atoms(sp.Function)) or any(
+            not power.exp.is_Integer for power in expression.atoms(sp.Pow)
+        )
+        if expression.free_symbols and expression.free_symbols <= fixed and costly:
             return found.setdefault(expression, sp.Symbol(f"constant {len(found)}", real=True))
         return expression.func(*map(walk, expression.args))
 
@@ -180,32 +182,29 @@ def equations_of(exported: Exported) -> IntegratorEquations:
     return IntegratorEquations(rates, switches, outputs, constants, steps, shown_steps)
 
 
+def fragments_of(exported: Exported) -> dict[str, object]:
+    """Return what files with an integrator of fixed steps have in common, by mark."""
+    least = MIN_STEPS_PRESCRIBED if exported.follows_motion else MIN_STEPS
+    steps_alone = not exported.states or is_linear(exported.frozen, exported.structure)
+    return {
+        "TITLE": f"Simulation of {exported.title}",
+        "HOLD_TEXT": hold_text(exported),
+        "MORE_INPUTS": "".join(f", {quantity.name}" for quantity in exported.inputs),
+        "STEP": repr(exported.step),
+        "MIN_STEPS": 1 if steps_alone else least,
+        "N_STATES": len(exported.states),
+        "N_MODES": len(exported.frozen.modes),
+    }
+
+
 def constant_names(equations: IntegratorEquations) -> dict[sp.Symbol, str]:
     """Return the names of the constants in code, which in exports differ from all names of rigs and effects."""
     return {symbol: symbol.name.replace(" ", "_") for symbol in equations.constants}
 
 
-def _costly(expression: sp.Expr) -> bool:
-    powers = (power for power in expression.atoms(sp.Pow) if not power.exp.is_Integer)
-    return bool(expression.atoms(sp.Function)) or any(True for _ in powers)
-
-
-def friction_mode(exported: Exported) -> int | None:
-    """Return the index of the mode that is the sign of the velocity which dry friction can hold, or None."""
-    return exported.frictions[0] if exported.frictions else None
-
-
-def friction_sign(exported: Exported) -> sp.Symbol:
-    """Return the symbol of this velocity's sign in outputs; while the friction sticks it stands for the share that holds."""
-    return exported.frozen.friction_sign(0)
-
-
 def held_velocity(exported: Exported) -> int | None:
-    """Return the index of the state that this velocity is; None where it is made of several."""
-    mode = friction_mode(exported)
-    states = exported.structure.states
-    switch = None if mode is None else exported.frozen.switches[mode]
-    return states.index(switch) if switch in states else None
+    """Return the index of the state that is the velocity which dry friction can hold; None where it is made of several."""
+    return exported.frozen.frictions[0].velocity if exported.frozen.frictions else None
 
 
 def slope_symbol(index: int) -> sp.Symbol:
@@ -215,13 +214,8 @@ def slope_symbol(index: int) -> sp.Symbol:
 
 def slip_rate(exported: Exported) -> sp.Expr:
     """Return the time derivative of the velocity that dry friction can hold, by the rates of the states; 0 without friction."""
-    mode = friction_mode(exported)
-    if mode is None:
+    if exported.friction is None:
         return sp.S.Zero
     along = {state: slope_symbol(i) for i, state in enumerate(exported.structure.states)}
-    along[TIME] = sp.S.One
-    for index in range(len(exported.sources)):
-        value, rate, curvature = input_symbols(index)
-        along |= {value: rate, rate: curvature}
-    switch = exported.frozen.switches[mode]
-    return sp.Add(*(derivative(switch, s) * rate for s, rate in along.items() if s in switch.free_symbols))
+    along |= {TIME: sp.S.One, **input_rates(len(exported.sources))}
+    return rate_along(exported.frozen.switches[exported.friction], along)

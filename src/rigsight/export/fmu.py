@@ -6,7 +6,7 @@ import io
 import platform
 import uuid
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 from xml.etree import ElementTree as ET
@@ -109,16 +109,9 @@ def interpolates(exported: Exported) -> bool:
     return bool(exported.sources) and (exported.follows_motion or exported.hold == "foh")
 
 
-def needs_constant_step(exported: Exported) -> bool:
-    """Return True if the model remembers samples, which must lie equally far apart."""
-    return exported.structure.delay is not None or exported.structure.first_shown_late is not None
-
-
-def model_description(
-    exported: Exported, source: str, name: str, guid: str, version: Literal[2, 3] = 2
-) -> str:
+def model_description(exported: Exported, source: str, name: str, guid: str, version: Version = 2) -> str:
     """Return the text of the description."""
-    variables = _unique([*_common(exported), *(_of_version_3(exported) if version == 3 else ())])
+    variables = _unique(_variables(exported, version))
     root = ET.Element("fmiModelDescription", fmiVersion=f"{version}.0", modelName=name)
     root.set("guid" if version == 2 else "instantiationToken", guid)
     step = f"A communication step is a sample: {hold_text(exported)}."
@@ -127,16 +120,17 @@ def model_description(
     root.set("variableNamingConvention", "flat")
     if version == 2:
         root.set("numberOfEventIndicators", "0")
-    simulation = ET.SubElement(root, "CoSimulation", modelIdentifier=name)
-    simulation.set("canHandleVariableCommunicationStepSize", _truth(not needs_constant_step(exported)))
+    # A model that remembers samples needs them equally far apart.
+    remembers = exported.structure.delay is not None or exported.structure.first_shown_late is not None
+    can = {"canHandleVariableCommunicationStepSize": _truth(not remembers)}
     if version == 2:
-        simulation.set("canInterpolateInputs", _truth(interpolates(exported)))
-        simulation.set("canGetAndSetFMUstate", "true")
-        simulation.set("canNotUseMemoryManagementFunctions", "true")
-        files = ET.SubElement(simulation, "SourceFiles")
-        ET.SubElement(files, "File", name=f"fmi2_{name}.c")
+        can |= {"canInterpolateInputs": _truth(interpolates(exported)), "canGetAndSetFMUstate": "true"}
+        can |= {"canNotUseMemoryManagementFunctions": "true"}
     else:
-        simulation.set("canGetAndSetFMUState", "true")
+        can |= {"canGetAndSetFMUState": "true"}
+    simulation = ET.SubElement(root, "CoSimulation", {"modelIdentifier": name, **can})
+    if version == 2:
+        ET.SubElement(ET.SubElement(simulation, "SourceFiles"), "File", name=f"fmi2_{name}.c")
     units = ET.SubElement(root, "UnitDefinitions")
     for unit in sorted({variable.unit for variable in variables}):
         ET.SubElement(units, "Unit", name=unit)
@@ -164,18 +158,17 @@ def build_description(name: str) -> str:
     return _text(root)
 
 
-def _common(exported: Exported) -> Iterator[_Variable]:
-    """Yield inputs, outputs and parameters in the order of the value references of both versions."""
+def _variables(exported: Exported, version: Version) -> Iterator[_Variable]:
+    """Yield inputs, outputs and parameters in the order of the value references of both versions, then those of version 3."""
     for q in exported.inputs:
         yield _Variable(q.name, q.unit or _NO_UNIT, q.description, "input", start=0.0)
     for q in exported.outputs:
         yield _Variable(q.name, q.unit or _NO_UNIT, q.description, "output", initial="calculated")
-    for q, value in zip(exported.parameters, exported.values, strict=True):
+    for q, value in exported.numbers:
         yield _Variable(q.name, q.unit or _NO_UNIT, q.description, "parameter", "fixed", "exact", value)
-
-
-def _of_version_3(exported: Exported) -> Iterator[_Variable]:
-    """Yield what that version has no function for (slopes of inputs), and what it wants listed (the time)."""
+    if version == 2:
+        return
+    # What version 3 has no function for (slopes of inputs), and what it wants listed (the time).
     for q in exported.inputs if interpolates(exported) else ():
         unit = f"{q.unit}/s" if q.unit else "1/s"
         what = f"slope of {q.name} until the next communication point; 0 keeps it constant"
@@ -183,7 +176,7 @@ def _of_version_3(exported: Exported) -> Iterator[_Variable]:
     yield _Variable("time", "s", "time", "independent")
 
 
-def _unique(variables: list[_Variable]) -> list[_Variable]:
+def _unique(variables: Iterable[_Variable]) -> list[_Variable]:
     taken: set[str] = set()
     unique = []
     for variable in variables:
@@ -196,7 +189,7 @@ def _unique(variables: list[_Variable]) -> list[_Variable]:
     return unique
 
 
-def _add(listed: ET.Element, reference: int, variable: _Variable, version: Literal[2, 3]) -> None:
+def _add(listed: ET.Element, reference: int, variable: _Variable, version: Version) -> None:
     """List a variable: where 2.0 has an element for the number inside, 3.0 has all in one."""
     element = ET.SubElement(
         listed,

@@ -7,18 +7,16 @@ from types import MappingProxyType
 
 import sympy as sp
 
-from rigsight.export.description import header_lines, hold_text
+from rigsight.export.description import header_lines
 from rigsight.export.equations import NO_START, Balance, Exported, words
 from rigsight.export.fixed_step import (
     constant_names,
     equations_of,
-    friction_mode,
-    friction_sign,
+    fragments_of,
     held_velocity,
     slip_rate,
     slope_symbol,
 )
-from rigsight.export.python_function import min_steps
 from rigsight.libraries.templates import filled, template, template_parts
 from rigsight.simulate.equations.structure import TIME, input_symbols
 from rigsight.simulate.equilibrium import BALANCED
@@ -56,10 +54,7 @@ def matlab_function(exported: Exported, source: str, name: str) -> str:
     late = structure.first_shown_late
     fragments = {
         "HEADER": "\n".join(f"% {line}".rstrip() for line in head),
-        "TITLE": f"Simulation of {exported.title}",
-        "HOLD_TEXT": hold_text(exported),
         "ARGUMENTS": ", ".join(["t", *inputs]),
-        "MORE_INPUTS": "".join(f", {name}" for name in inputs),
         "N_ARGUMENTS": 1 + len(inputs),
         "OUTPUT_TEXT": ", ".join(output.name for output in exported.outputs),
         "STATE_TEXT": ", ".join(state.name for state in exported.states) or "(none)",
@@ -67,27 +62,23 @@ def matlab_function(exported: Exported, source: str, name: str) -> str:
         "READ_SIGNS": "  m = read_signs(m, piece, start + split, 0);\n" if exported.hold == "zoh" else "",
         "AS_MEASURED": "" if late is None else _part("AS_MEASURED", {"LATE": MATLAB.expression(late, names)}),
         "PARAMETERS": "\n".join(
-            f"p.{q.name} = {value!r};   % [{q.unit}] {q.description}"
-            for q, value in zip(exported.parameters, exported.values, strict=True)
+            f"p.{q.name} = {value!r};   % [{q.unit}] {q.description}" for q, value in exported.numbers
         ),
         "PREPARE": "\n".join(prepare),
-        "STEP": repr(exported.step),
-        "MIN_STEPS": min_steps(exported),
         "RATES": _body("r", equations.rates, {**names, **modes}, equations.steps),
         "SWITCHES": _body("g", equations.switches, {**names, **modes}),
         "OUTPUTS": _body(
-            "y", equations.outputs, {**names, friction_sign(exported): "friction_sign"}, equations.shown_steps
+            "y", equations.outputs, {**names, frozen.friction_sign(0): "friction_sign"}, equations.shown_steps
         ),
         "PIECES": _pieces(exported, inputs),
         "WITHOUT_MODES": "" if frozen.modes else "  m.x = x_new;\n  return\n",
         **_friction(exported),
         "LIMITS": _limits(exported),
         "REST": _rest(exported),
-        "N_STATES": len(exported.states),
-        "N_MODES": len(frozen.modes),
         "N_OUTPUTS": len(exported.outputs),
         "N_COMPUTED": len(structure.computed_outputs),
         "NAME": name,
+        **fragments_of(exported),
     }
     return filled(template("export", "model.m.txt"), fragments)
 
@@ -111,7 +102,7 @@ def _names(exported: Exported) -> dict[sp.Symbol, str]:
 
 def _friction(exported: Exported) -> dict[str, str]:
     """Return what belongs to the sticking of dry friction, by mark; empty texts without it."""
-    mode, velocity = friction_mode(exported), held_velocity(exported)
+    mode, velocity = exported.friction, held_velocity(exported)
     if mode is None:
         return dict.fromkeys(_OF_FRICTION, "")
     slopes = {slope_symbol(i): f"slopes({i + 1})" for i in range(len(exported.states))}

@@ -26,10 +26,7 @@ def modelica(exported: Exported, source: str, name: str) -> str:
     """Return the text of one model without a library."""
     structure, names = exported.structure, exported.names()
     used = {q.name for q in (*exported.parameters, *exported.states, *exported.inputs)}
-    declared = [
-        f"parameter Real {q.name}{_unit(q)} = {value!r} {_said(q)};"
-        for q, value in zip(exported.parameters, exported.values, strict=True)
-    ]
+    declared = [f"parameter Real {q.name}{_unit(q)} = {value!r} {_said(q)};" for q, value in exported.numbers]
     declared += [f"input Real {q.name}{_unit(q)} {_said(q)};" for q in exported.inputs]
     equations: list[str] = []
     if structure.delay is not None:

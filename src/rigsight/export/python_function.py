@@ -7,15 +7,13 @@ from collections.abc import Mapping, Set
 
 import sympy as sp
 
-from rigsight.export.description import header_lines, hold_text, indented
+from rigsight.export.description import header_lines, indented
 from rigsight.export.equations import NO_START, Balance, Exported, words
 from rigsight.export.fixed_step import (
     constant_names,
     equations_of,
-    friction_mode,
-    friction_sign,
+    fragments_of,
     held_velocity,
-    is_linear,
     slip_rate,
     slope_symbol,
 )
@@ -28,23 +26,11 @@ WORDS = frozenset(keyword.kwlist)
 """Of the language."""
 INPUT_WORDS = words("t n dt parameters initial_state PARAMETERS ValueError float list range zip")
 """Of the template where inputs are arguments and not read yet, beside what no name in any export is."""
-MIN_STEPS = 4
-"""Steps per sample of a model with kinks or products, whose time scales depend on the motion."""
-MIN_STEPS_PRESCRIBED = 32
-"""The same if the motion is prescribed: the model has no time scale that requires more."""
-
 _PIECES = {"zoh": "_steps({})", "foh": "_lines({}, dt)", "cubic": "_cubics({}, {}, dt)"}
 _OWN_WORDS_OF_REST = words("first inertia stiffness")
 """Of `_REST` where parameters stand, beside what no name in any export is."""
 _OWN_WORDS_OF_START = words("x any len ValueError")
 """The same of the template of the equilibrium of several motions."""
-
-
-def min_steps(exported: Exported) -> int:
-    """Return how many internal steps a sample has at least: 1 where the equations are linear."""
-    if not exported.states or is_linear(exported.frozen, exported.structure):
-        return 1
-    return MIN_STEPS_PRESCRIBED if exported.follows_motion else MIN_STEPS
 
 
 def python_function(exported: Exported, source: str) -> str:
@@ -56,34 +42,28 @@ def python_function(exported: Exported, source: str) -> str:
     constants = constant_names(equations)
     names = code_names(exported, own) | constants
     modes = {mode: f"modes[{i}]" for i, mode in enumerate(frozen.modes)}
-    every, shown = {**names, **modes}, {**names, friction_sign(exported): "friction_sign"}
+    every, shown = {**names, **modes}, {**names, frozen.friction_sign(0): "friction_sign"}
     inputs = [quantity.name for quantity in exported.inputs]
     unpack = unpacked_states(exported, own)
     slopes = {slope_symbol(i): f"slopes[{i}]" for i in range(len(exported.states))}
+    slipping = PYTHON.statements(["result"], [slip_rate(exported)], {**names, **slopes})
     prepare = PYTHON.statements(list(constants.values()), list(equations.constants.values()), names)
     limits = [PYTHON.expression(limit, names) for limit in exported.limits.values()]
     fragments = {
-        "TITLE": f"Simulation of {exported.title}",
         "HEADER": "\n".join(header_lines(exported, source)),
         "PARAMETERS": indented(parameter_entries(exported)),
         "STATES": sequence([repr(state.name) for state in exported.states]),
-        "STEP": repr(exported.step),
-        "MIN_STEPS": min_steps(exported),
-        "FRICTION": repr(friction_mode(exported)),
+        "FRICTION": repr(exported.friction),
         "VELOCITY": repr(held_velocity(exported)),
-        "N_STATES": len(exported.states),
-        "N_MODES": len(frozen.modes),
         "DEPENDENT_MODES": sequence([str(i) for i in frozen.dependent_modes]),
         "LIMITED": sequence([str(i) for i in exported.limits]),
         "ARGUMENTS": "".join(f"{name}, " for name in inputs),
-        "MORE_INPUTS": "".join(f", {name}" for name in inputs),
-        "HOLD_TEXT": hold_text(exported),
         "N_OUTPUTS": len(structure.computed_outputs),
         "UNPACK_PARAMETERS": indented([*unpacked_parameters(exported, own), *prepare]),
         "RATES": _returned(unpack, list(equations.rates), every, equations.steps),
         "SWITCHES": _returned(unpack, list(equations.switches), every),
         "OUTPUTS": _returned(unpack, list(equations.outputs), shown, equations.shown_steps),
-        "SLIP_RATE": _returned_one(unpack, slip_rate(exported), {**names, **slopes}),
+        "SLIP_RATE": indented([*unpack, *slipping, "return result"], 2),
         "LIMITS": sequence(limits),
         "DELAY": _number(exported, structure.delay, "0.0"),
         "SENSOR_DELAY": _number(exported, structure.first_shown_late, "None"),
@@ -94,6 +74,7 @@ def python_function(exported: Exported, source: str) -> str:
         "REST": _rest(exported),
         "OUTPUT_NAMES": sequence([repr(output.name) for output in exported.outputs]),
         "FIRST_OUTPUT": repr(exported.outputs[0].name),
+        **fragments_of(exported),
     }
     text = filled(template("export", "model.py.txt"), fragments)
     return text.replace("else before\n\n        motion", "else before\n        motion")
@@ -116,8 +97,7 @@ def code_names(exported: Exported, own: Set[str]) -> dict[sp.Symbol, str]:
 
 def parameter_entries(exported: Exported) -> list[str]:
     """Return the lines of a dict of the parameters with their units."""
-    pairs = zip(exported.parameters, exported.values, strict=True)
-    return [f'"{q.name}": {value!r},  # [{q.unit}] {q.description}' for q, value in pairs]
+    return [f'"{q.name}": {value!r},  # [{q.unit}] {q.description}' for q, value in exported.numbers]
 
 
 def unpacked_parameters(exported: Exported, own: Set[str]) -> list[str]:
@@ -154,11 +134,6 @@ def _number(exported: Exported, expression: sp.Expr | None, without: str) -> str
     used = {exported.names()[symbol] for symbol in expression.free_symbols}
     lines = [f'{name} = numbers["{name}"]' for name in sorted(used)]
     return indented([*lines, f"return {PYTHON.expression(expression, exported.names())}"])
-
-
-def _returned_one(unpack: list[str], expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> str:
-    lines = PYTHON.statements(["result"], [expression], names)
-    return indented([*unpack, *lines, "return result"], 2)
 
 
 def _pieces(exported: Exported, inputs: list[str]) -> str:

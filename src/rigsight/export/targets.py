@@ -233,8 +233,7 @@ def _hold(target: Target, model: Model, wished: Hold | None) -> Hold:
     if wished is not None:
         check_option("--hold", hold, ("foh", "zoh"))
     mechanism = model.structure.rig.mechanism
-    prescribing = {coordinate.prescribed_by for coordinate in mechanism.prescribed}
-    if set(mechanism.inputs) <= prescribing or not target.steps:
+    if set(mechanism.inputs) <= mechanism.prescribing or not target.steps:
         return "foh"
     if hold == "band_limited":
         raise InputError(
@@ -257,11 +256,11 @@ def _check_step(target: Target, step: float) -> None:
 
 
 def _check_name(target: Target, name: str) -> None:
-    why = ""
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,59}", name):
         why = f"cannot be the name of a {target.name} model, which is that of its file: letters, digits and underscores, "
         why += "a letter first, at most 60"
     elif name in target.words:
         why = f"is a word of the language and no name for a {target.name} model"
-    if why:
-        raise InputError(f"'{name}' {why}. Name another file with --out.")
+    else:
+        return
+    raise InputError(f"'{name}' {why}. Name another file with --out.")

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from rigsight.effects import symbols
+from rigsight.effects.effect import Effect
 from rigsight.effects.symbols import derivative, positive_part
 from rigsight.rigs.mechanism import Mechanism
-from rigsight.rigs.parts import READING, Drive
+from rigsight.rigs.parts import Drive, reading_symbol
 
 _INSIDE = sp.Symbol("inside the limits", real=True)
 
@@ -42,6 +44,20 @@ class Controller:
         """Return the signal of the drive for an output of the controller."""
         return self.limits.xreplace({_INSIDE: output})
 
+    def suits(self, effect: Effect) -> bool:
+        """Return False for an effect of the drive under another name, or of this controller."""
+        rates = [derivative(state.rate, symbols.command) for state in effect.states]
+        filters = effect.command is not None and not any(rate.has(symbols.command) for rate in rates)
+        if effect.command_delay is not None or filters:
+            return not self.in_force  # There it is a delay or a lag of the drive.
+        reads_command = effect.reads(symbols.command)
+        if not effect.states and not reads_command and self.error == self.output:
+            return self.in_force  # Else it is a dead zone or a saturation of the drive.
+        if reads_command or effect.reads(symbols.error):
+            return True
+        # Of the output alone: an integral of it beside that of the error, and a saturation beside that of the drive.
+        return self.error != self.output if effect.states else self.in_force
+
 
 def controller_of(mechanism: Mechanism, drive: Drive) -> Controller | None:
     """Return the law by which a drive follows a recorded input and reacts to the motion; None for a drive that does not."""
@@ -66,16 +82,12 @@ def controller_of(mechanism: Mechanism, drive: Drive) -> Controller | None:
 
 def _motion(mechanism: Mechanism) -> set[sp.Symbol]:
     moving = {symbol for c in mechanism.free for symbol in (c.symbol, c.rate)}
-    return moving | {sp.Symbol(f"{READING}{sensor.name}", real=True) for sensor in mechanism.sensors}
+    return moving | {reading_symbol(sensor.name) for sensor in mechanism.sensors}
 
 
 def _parts(mechanism: Mechanism, law: sp.Expr, inputs: set[sp.Symbol]) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
     rates = {c.rate for c in mechanism.coordinates}
-    of_speed = {
-        sp.Symbol(f"{READING}{sensor.name}", real=True)
-        for sensor in mechanism.sensors
-        if sensor.reads.free_symbols & rates
-    }
+    of_speed = {reading_symbol(s.name) for s in mechanism.sensors if s.reads.free_symbols & rates}
     still = law.xreplace(dict.fromkeys(rates | of_speed, sp.S.Zero))
     error = still if still.free_symbols & _motion(mechanism) else law
     return law, error, sp.expand(law - law.xreplace(dict.fromkeys(inputs, sp.S.Zero)))

@@ -12,7 +12,7 @@ import numpy as np
 import sympy as sp
 from sympy.simplify.fu import TR8
 
-from rigsight.effects.symbols import derivative
+from rigsight.effects.symbols import derivative, rate_along
 from rigsight.parameters import Parameter
 from rigsight.rigs.parts import (
     Coordinate,
@@ -66,6 +66,11 @@ class Mechanism:
         return tuple(c for c in self.coordinates if c.prescribed_by is not None)
 
     @property
+    def prescribing(self) -> frozenset[str]:
+        """Names of the inputs that prescribe a motion."""
+        return frozenset(c.prescribed_by for c in self.coordinates if c.prescribed_by is not None)
+
+    @property
     def first_joint(self) -> Joint:
         """The joint that effects at drives and sensors read; without joints, the first motion, if any, which nothing resists."""
         if self.joints:
@@ -108,12 +113,8 @@ class Mechanism:
         own = sp.Symbol(drive.name, real=True)
         gain = derivative(drive.force, own)
         read = gain.free_symbols | {own, *drive.signal.free_symbols}
-        return (
-            drive.signal == sp.Symbol(self.inputs[0], real=True)
-            and sp.expand(drive.force - gain * own) == 0
-            and own not in gain.free_symbols
-            and not read & self.moving
-        )
+        is_gain = own not in gain.free_symbols and sp.expand(drive.force - gain * own) == 0
+        return is_gain and drive.signal == sp.Symbol(self.inputs[0], real=True) and not read & self.moving
 
     @cached_property
     def mass_matrix(self) -> sp.ImmutableMatrix:
@@ -184,19 +185,17 @@ class Mechanism:
 
     def rate(self, expression: sp.Expr) -> sp.Expr:
         """Return the time derivative of an expression of the coordinates and states."""
-        rates = [(c.symbol, c.rate) for c in self.coordinates] + [(s.symbol, s.rate) for s in self.states]
-        return sum((derivative(expression, symbol) * rate for symbol, rate in rates), start=sp.Integer(0))
+        rates = {c.symbol: c.rate for c in self.coordinates} | {s.symbol: s.rate for s in self.states}
+        return rate_along(expression, rates)
 
     def prescribed_rate(self, expression: sp.Expr) -> sp.Expr:
         """Return the time derivative of an expression of prescribed coordinates and their rates."""
-        along = (derivative(expression, c.rate) * acceleration(c) for c in self.prescribed)
-        return sum(along, start=self.rate(expression))
+        accelerations = {c.rate: acceleration(c) for c in self.prescribed}
+        return self.rate(expression) + rate_along(expression, accelerations)
 
     def written_out(self, expression: sp.Expr) -> sp.Expr:
         """Return an expression without named signals."""
-        for symbol, signal in reversed(list(self.signals.items())):
-            expression = expression.xreplace({symbol: signal})
-        return expression
+        return without_signals(expression, self.signals)
 
     def carried_by(self, joint: Joint) -> sp.Expr:
         """Return what drives, weight and other joints' springs put on a joint: the push of drives less what the others do."""
@@ -225,12 +224,10 @@ class Mechanism:
             return sp.S.Zero  # How weight is shared between joints of several coordinates no equation says.
         (coordinate,) = along
         at_rest = {c.rate: sp.Integer(0) for c in self.coordinates}
-        springs = [
-            derivative(other.motion, coordinate.symbol)
-            * (other.stiffness * (other.motion - other.rest) + other.force.xreplace(at_rest))
-            for other in self.joints
-            if other is not joint
-        ]
+        springs = []
+        for other in (own for own in self.joints if own is not joint):
+            force = other.stiffness * (other.motion - other.rest) + other.force.xreplace(at_rest)
+            springs.append(derivative(other.motion, coordinate.symbol) * force)
         weight = derivative(self.potential, coordinate.symbol)
         return sp.Add(weight, *springs) / derivative(joint.motion, coordinate.symbol)
 
@@ -272,6 +269,13 @@ class Mechanism:
         mass = np.array([float(entry.xreplace(numbers)) for entry in self.mass_matrix]).reshape(n, n)
         along = np.array([float(slope.xreplace(numbers)) for slope in slopes])
         return float(1.0 / (along @ np.linalg.solve(mass, along)))
+
+
+def without_signals(expression: sp.Expr, signals: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
+    """Return an expression with the values of named signals, each of which reads only those in front of it."""
+    for symbol, signal in reversed(list(signals.items())):
+        expression = expression.xreplace({symbol: signal})
+    return expression
 
 
 def _shortened(expression: sp.Expr) -> sp.Expr:

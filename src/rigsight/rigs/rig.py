@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import sympy as sp
 
+from rigsight.effects import symbols
 from rigsight.effects.effect import Effect, Place
 from rigsight.effects.symbols import derivative
 from rigsight.parameters import Parameter
 from rigsight.rigs.controller import Controller, controller_of
 from rigsight.rigs.evaluation import evaluated
 from rigsight.rigs.mechanism import Mechanism
-from rigsight.rigs.offered import suits_place
 from rigsight.rigs.parts import Drive, Follower, Joint, Motion, RateState, Sensor, Signal, follower_of
 from rigsight.units import unit_text
 
@@ -86,8 +86,7 @@ class Rig:
     @property
     def absent_inputs(self) -> tuple[str, ...]:
         """Names of the inputs that are 0 in a record that holds none of them: those that prescribe no motion."""
-        prescribing = {coordinate.prescribed_by for coordinate in self.mechanism.prescribed}
-        return tuple(signal.name for signal in self.inputs if signal.name not in prescribing)
+        return tuple(s.name for s in self.inputs if s.name not in self.mechanism.prescribing)
 
     @property
     def alternative_parameters(self) -> tuple[Parameter, ...]:
@@ -216,9 +215,8 @@ class Rig:
         sensors = self.sensors_of_motion
         kept = {sensor.name for sensor in sensors} | {drive.name for drive in self.mechanism.drives}
         order = tuple(name for name in self.mechanism.order if name in kept)
-        own = {part.name: getattr(self, part.name) for part in fields(Rig)}
         mechanism = replace(self.mechanism, states=(), sensors=sensors, order=order)
-        return Rig(**{**own, "mechanism": mechanism, "declaration": {}})
+        return replace(self, mechanism=mechanism, declaration={})
 
     def with_unit(self, parameter: Parameter, place: str | None = None) -> Parameter:
         """Return the parameter with its unit on this rig, at a place or at its first joint.
@@ -336,14 +334,38 @@ class Rig:
             return False
         if effect.place is Place.LATERAL_DYNAMICS:
             return self.follower is not None
-        if not self.places(effect.place) or not suits_place(
-            effect, self.acts_at(effect), self.mechanism, self.controllers, self.parameters
-        ):
+        if not self.places(effect.place) or not self._suits(effect):
             return False
         if self.is_driven or effect.shifts_the_record:
             return True
         lacks_inertia = effect.needs_inertia and joint_of(self, effect).inertia is None
         return effect.place is Place.DYNAMICS and not lacks_inertia
+
+    def _suits(self, effect: Effect) -> bool:
+        """Return False where an effect lacks what it acts on, or does what another one at its place does already."""
+        mechanism, at = self.mechanism, self.acts_at(effect)
+        if effect.place is Place.CONTROLLER:
+            return self.controllers[at].suits(effect)
+        if effect.place is Place.SENSOR and effect.wave_number is not None:
+            sensor = next(own for own in mechanism.sensors if own.name == at)
+            return not any(c.rate in sensor.reads.free_symbols for c in mechanism.coordinates)
+        joint = joint_of(self, effect)
+        if effect.reads(symbols.acceleration) and mechanism.moves_inertia(joint.motion):
+            return False  # Only that of a prescribed motion is known.
+        if effect.needs_known_inertia and not mechanism.has_known_inertia(joint.motion, self.parameters):
+            return False
+        # What needs the inertia of a joint takes forces of the drive from it, with a load or without.
+        if effect.reads(symbols.driven) and not effect.needs_inertia:
+            resists = (mechanism.resisted_by(joint), joint.stiffness, joint.force)
+            if mechanism.driven_by(joint) == 0 or not any(part != 0 for part in resists):
+                return False
+        if effect.at is None or effect.place not in (Place.DYNAMICS, Place.DISTURBANCE):
+            return True
+        if effect.reads_inertia and joint.inertia is None and not mechanism.has_short_inverse:
+            return False
+        if joint.stiffness == 0 and (effect.spring is not None or effect.deflection is not None):
+            return False
+        return not effect.needs_inertia or joint.inertia is not None or mechanism.moves_inertia(joint.motion)
 
 
 def joint_of(rig: Rig, effect: Effect) -> Joint:

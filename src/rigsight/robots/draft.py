@@ -13,7 +13,6 @@ import sympy as sp
 
 from rigsight.errors import InputError
 from rigsight.rigs import Rig, rig_of_tables
-from rigsight.robots.declared_numbers import DeclaredNumbers, Field, Names
 from rigsight.robots.energies import Energies, energies_of
 from rigsight.robots.free_joints import (
     FreeJoint,
@@ -25,13 +24,15 @@ from rigsight.robots.free_joints import (
 )
 from rigsight.robots.parts import TreeSensor, actuators_of, left_out_of, sensors_of
 from rigsight.robots.tables import (
+    DeclaredNumbers,
+    Field,
+    Names,
     armature,
     drive_of,
     gear_table,
     joint_table,
     plain_drive,
     split_joints,
-    way_unit,
 )
 from rigsight.robots.tree import LockedJoint, TreeJoint, bodies_of, check_locked, gravity_of, load_spec
 from rigsight.simulators import has_constraints
@@ -148,7 +149,7 @@ def draft_rig(
         if joint.name in locked:
             q, position = coordinates[index], locked[joint.name]
             about = f"position in which {q} is locked"
-            held[index] = numbers.symbol_of_constant(f"{q}_held", position, way_unit(joint), about)
+            held[index] = numbers.symbol_of_constant(f"{q}_held", position, joint.way_unit, about)
             notes.append(
                 f"Joint {q} is locked; a record may hold it elsewhere: constants = {{ {held[index].name} = ... }}."
             )
@@ -193,7 +194,7 @@ def draft_rig(
         "inputs": {drive.reported: drive.control for drive in drives},
         "constants": {},
         "parameters": numbers.parameters,
-        "coordinates": {q: {"unit": way_unit(joint)} for joint, q in moving}
+        "coordinates": {q: {"unit": joint.way_unit} for joint, q in moving}
         | {name: table for joint in free_joints for name, table in joint.coordinates.items()},
         "energy": {"kinetic": _sum(*energies.kinetic, *rotors), "potential": _sum(*energies.potential)},
         "simulator": {}
@@ -247,7 +248,7 @@ def _sensor_tables(
 ) -> list[tuple[str, TreeSensor, dict[str, Any]]]:
     found = []
     for sensor in sensors:
-        q, unit = coordinates[sensor.joint], way_unit(joints[sensor.joint])
+        q, unit = coordinates[sensor.joint], joints[sensor.joint].way_unit
         what = ("position", "velocity") if joints[sensor.joint].slides else ("angle", "speed")
         name = names.free(sensor.name or f"{q}_{what[sensor.is_rate]}", "sensor")
         factor = numbers.factor(f"{name}_factor", sensor.factor, f"reading of {name} per motion of the joint")

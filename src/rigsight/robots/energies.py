@@ -14,8 +14,9 @@ import numpy as np
 import sympy as sp
 
 from rigsight.records.record import Floats
-from rigsight.robots.declared_numbers import DeclaredNumbers, Field
+from rigsight.robots.tables import DeclaredNumbers, Field
 from rigsight.robots.tree import TreeBody, TreeJoint
+from rigsight.simulate.equations.straight_line import needed_steps
 
 AXES = "xyz"
 
@@ -88,22 +89,10 @@ def energies_of(
             frame = _named(frame, name, found.signals)
         frames[body.index] = frame
         _add(found, body, frame, known)
-    return _with_what_is_read(found)
-
-
-def _with_what_is_read(energies: Energies) -> Energies:
-    """Return energies with the signals alone that they are made of."""
-    waiting: set[str] = {
-        s.name for term in (*energies.kinetic, *energies.potential) for s in term.free_symbols
-    }
-    read: set[str] = set()
-    while waiting:
-        name = waiting.pop()
-        if name in energies.signals and name not in read:
-            read.add(name)
-            waiting |= {symbol.name for symbol in energies.signals[name].free_symbols}
-    signals = {name: signal for name, signal in energies.signals.items() if name in read}
-    return replace(energies, signals=signals)
+    # The signals alone that the energies are made of.
+    signals = {sp.Symbol(name, real=True): signal for name, signal in found.signals.items()}
+    read = needed_steps([*found.kinetic, *found.potential], signals)
+    return replace(found, signals={symbol.name: signal for symbol, signal in read.items()})
 
 
 @dataclass(frozen=True)

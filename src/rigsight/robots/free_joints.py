@@ -10,8 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rigsight.robots.declared_numbers import DeclaredNumbers, Names
-from rigsight.robots.tables import way_unit
+from rigsight.robots.tables import DeclaredNumbers, Names
 from rigsight.robots.tree import TreeJoint
 
 if TYPE_CHECKING:
@@ -82,7 +81,7 @@ def start_of(
     if not free_joints:
         return {}
     at = model.key_qpos[0] if model.nkey else model.qpos0
-    places = {q: (int(model.jnt_qposadr[joint.index]), way_unit(joint)) for q, joint in scalar.items()}
+    places = {q: (int(model.jnt_qposadr[joint.index]), joint.way_unit) for q, joint in scalar.items()}
     for own in free_joints:
         places |= {name: (place, "m" if name in own.places else "1") for name, place in own.positions.items()}
     initial = {

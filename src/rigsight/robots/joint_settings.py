@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rigsight.effects import kind_of
+from rigsight.effects import Effect
 from rigsight.errors import InputError, check_in_range
-from rigsight.robots.declared_numbers import Field
-from rigsight.robots.draft import RigDraft
-from rigsight.robots.writing_back import WrittenBack, read_for
+from rigsight.robots.draft import RobotFile
+from rigsight.robots.tables import Field
+from rigsight.robots.writing_back import WrittenBack, in_words, read_for
 from rigsight.simulate.model import Model
 
 _FIELDS: Mapping[tuple[str, str], tuple[str, ...]] = {
@@ -24,6 +24,8 @@ _FIELDS: Mapping[tuple[str, str], tuple[str, ...]] = {
     ("joint", "armature"): ("armature",),
 }
 """Element and attribute of MuJoCo -> the settings that say the same."""
+_FORCE_RANGE = ("actuator", "forcerange")
+_NO_FIELD = Field("", -1, "")
 _STEPS = (1e-6, 1.0)
 """Shortest and longest step of the physics [s]."""
 
@@ -49,19 +51,6 @@ class JointSettings:
     step: float  # of the physics [s]
 
 
-@dataclass
-class _Settings:
-    """Settings of each joint as they are found."""
-
-    by_joint: dict[int, dict[str, float]]
-    written: list[str]
-    without_field: list[str]
-
-    def add(self, joint: int, setting: str, value: float) -> None:
-        group = self.by_joint[joint]
-        group[setting] = group.get(setting, 0.0) + value
-
-
 def joint_settings(
     model: Model, source: Path, step: float | None = None, *, has_integral_gain: bool = False
 ) -> JointSettings:
@@ -71,108 +60,100 @@ def joint_settings(
     if step is not None:
         check_in_range("--step", step, *_STEPS, "s")
     robot = read_for(model, source)
-    compiled, draft = robot.model, robot.draft
-    settings = _Settings({index: {} for index in draft.joints.values()}, [], [])
-    drives = {
-        drive: (int(compiled.actuator_trnid[index, 0]), float(compiled.actuator_gear[index, 0]))
-        for drive, index in draft.drives.items()
-        if index >= 0
-    }
-    for drive, (joint, gear) in drives.items():
-        _gains(model, drive, joint, gear, settings)
-    _numbers(model, draft, settings)
-    _force_limits(model, draft, compiled, settings)
-    _effects(model, draft, drives, settings, has_integral_gain)
-    slides = compiled.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE)
+    settings = _Settings(model, robot)
+    settings.add_gains()
+    settings.add_numbers()
+    settings.add_force_limits()
+    for effect in model.effects:
+        settings.add_effect(effect, has_integral_gain)
+    slides = robot.model.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE)
     joints = tuple(
-        SettingsOfJoint(compiled.joint(index).name or place, bool(slides[index]), settings.by_joint[index])
-        for place, index in draft.joints.items()
+        SettingsOfJoint(
+            robot.model.joint(index).name or place, bool(slides[index]), settings.of_joints[index]
+        )
+        for place, index in robot.draft.joints.items()
     )
-    step = float(compiled.opt.timestep) if step is None else step
+    step = float(robot.model.opt.timestep) if step is None else step
     return JointSettings(joints, tuple(settings.written), tuple(settings.without_field), step)
 
 
-def _gains(model: Model, drive: str, joint: int, gear: float, settings: _Settings) -> None:
-    """Add the gains of a position controller, at the joint: behind a gear they count by its square."""
-    for name, setting in ((f"{drive}_kp", "stiffness"), (f"{drive}_kv", "damping")):
-        if name in model.values:
-            settings.by_joint[joint][setting] = gear**2 * model.values[name]
-            settings.written.append(f"{setting} of {drive}")
+class _Settings:
+    """Settings of each joint, by its number, as they are found."""
 
+    def __init__(self, model: Model, robot: RobotFile) -> None:
+        self._model, self._draft, self._compiled = model, robot.draft, robot.model
+        self.of_joints: dict[int, dict[str, float]] = {index: {} for index in robot.draft.joints.values()}
+        self.written: list[str] = []
+        self.without_field: list[str] = []
+        joints, gears = robot.model.actuator_trnid[:, 0], robot.model.actuator_gear[:, 0]
+        drives = {drive: index for drive, index in robot.draft.drives.items() if index >= 0}
+        self._drives = {drive: (int(joints[i]), float(gears[i]), i) for drive, i in drives.items()}
 
-def _force_limits(model: Model, draft: RigDraft, compiled: Any, settings: _Settings) -> None:
-    """Add the upper end of each drive's range of forces: the setting is the same limit in both directions."""
-    for drive, index in draft.drives.items():
-        if index < 0 or not compiled.actuator_forcelimited[index]:
-            continue
-        # An end at zero is no constant of the rig.
-        ends = dict(enumerate(map(float, compiled.actuator_forcerange[index])))
-        names = {0: f"lower limit of {drive}", 1: f"upper limit of {drive}"}
-        for name, value in model.values.items():
-            field = draft.fields.get(name, (None,))[0]
-            if field is not None and _limits_force(field) and field.index == index:
-                ends[field.entry], names[field.entry] = value, name
-        weakest, strongest = (f"{names[end]} = {ends[end]:.4g}" for end in (0, 1))
-        if ends[1] > 0.0:
-            gear = abs(float(compiled.actuator_gear[index, 0]))
-            joint = int(compiled.actuator_trnid[index, 0])
-            settings.by_joint[joint]["effort_limit"] = gear * ends[1]
-            settings.written.append(strongest)
-        else:
-            settings.without_field.append(strongest)
-        if ends[0] != -ends[1]:
-            settings.without_field.append(f"{weakest}, unlike the upper end")
+    def _add(self, joint: int, setting: str, value: float) -> None:
+        group = self.of_joints[joint]
+        group[setting] = group.get(setting, 0.0) + value
 
+    def add_gains(self) -> None:
+        """Add the gains of position controllers, at the joint: behind a gear they count by its square."""
+        for drive, (joint, gear, _) in self._drives.items():
+            for name, setting in ((f"{drive}_kp", "stiffness"), (f"{drive}_kv", "damping")):
+                if name in self._model.values:
+                    self.of_joints[joint][setting] = gear**2 * self._model.values[name]
+                    self.written.append(f"{setting} of {drive}")
 
-def _limits_force(field: Field) -> bool:
-    return (field.element, field.attribute) == ("actuator", "forcerange")
+    def add_numbers(self) -> None:
+        known = self._draft.tables.get("constants", {})
+        for name, value in self._model.values.items():
+            field = self._draft.fields.get(name, (_NO_FIELD,))[0]
+            at = (field.element, field.attribute)
+            if at == _FORCE_RANGE:
+                continue
+            if at in _FIELDS and not field.entry:
+                for setting in _FIELDS[at]:
+                    self._add(field.index, setting, value)
+                self.written.append(f"{name} = {value:.4g}")
+            elif name in self._draft.values or (name in known and value != known[name]["default"]):
+                self.without_field.append(f"{name} = {value:.4g}")
 
+    def add_force_limits(self) -> None:
+        """Add the upper end of each drive's range of forces: the setting is the same limit in both directions."""
+        for drive, (joint, gear, index) in self._drives.items():
+            if not self._compiled.actuator_forcelimited[index]:
+                continue
+            # An end at zero is no constant of the rig.
+            ends = dict(enumerate(map(float, self._compiled.actuator_forcerange[index])))
+            names = {0: f"lower limit of {drive}", 1: f"upper limit of {drive}"}
+            for name, value in self._model.values.items():
+                field = self._draft.fields.get(name, (_NO_FIELD,))[0]
+                if (field.element, field.attribute) == _FORCE_RANGE and field.index == index:
+                    ends[field.entry], names[field.entry] = value, name
+            weakest, strongest = (f"{names[end]} = {ends[end]:.4g}" for end in (0, 1))
+            if ends[1] > 0.0:
+                self.of_joints[joint]["effort_limit"] = abs(gear) * ends[1]
+            (self.written if ends[1] > 0.0 else self.without_field).append(strongest)
+            if ends[0] != -ends[1]:
+                self.without_field.append(f"{weakest}, unlike the upper end")
 
-def _numbers(model: Model, draft: RigDraft, settings: _Settings) -> None:
-    known = draft.tables.get("constants", {})
-    for name, value in model.values.items():
-        field = draft.fields.get(name, (None,))[0]
-        setting = None if field is None or field.entry else _FIELDS.get((field.element, field.attribute))
-        if field is not None and _limits_force(field):
-            continue
-        if setting is not None and field is not None:
-            for one in setting:
-                settings.add(field.index, one, value)
-            settings.written.append(f"{name} = {value:.4g}")
-        elif name in draft.values or (name in known and value != known[name]["default"]):
-            settings.without_field.append(f"{name} = {value:.4g}")
-
-
-def _effects(
-    model: Model,
-    draft: RigDraft,
-    drives: Mapping[str, tuple[int, float]],
-    settings: _Settings,
-    has_integral_gain: bool,
-) -> None:
-    structure = model.structure
-    for effect in model.effects:
-        place, kind = structure.rig.acts_at(effect), kind_of(effect.name)
-        values = structure.values_of(effect, model.values)
-        reported = f"{kind} at {place} ({', '.join(f'{own} = {value:.4g}' for own, value in values.items())})"
-        driven, gear = drives.get(place, (-1, 1.0))
-        joint, kp = draft.joints.get(place, driven), model.values.get(f"{place}_kp", 0.0)
+    def add_effect(self, effect: Effect, has_integral_gain: bool) -> None:
+        kind, place, values, reported = in_words(effect, self._model)
+        driven, gear, _ = self._drives.get(place, (-1, 1.0, -1))
+        joint, kp = self._draft.joints.get(place, driven), self._model.values.get(f"{place}_kp", 0.0)
         match kind:
             case "coulomb_friction" if joint >= 0:
-                for own in ("friction", "dynamic_friction"):
-                    settings.add(joint, own, values["T_c"])
+                self._add(joint, "friction", values["T_c"])
+                self._add(joint, "dynamic_friction", values["T_c"])
             case "stribeck_friction" if joint >= 0:
-                settings.add(joint, "friction", values["T_s"])
-                settings.add(joint, "dynamic_friction", values["T_c"])
-                settings.without_field.append(f"w_s = {values['w_s']:.4g} of {kind} at {place}")
+                self._add(joint, "friction", values["T_s"])
+                self._add(joint, "dynamic_friction", values["T_c"])
+                self.without_field.append(f"w_s = {values['w_s']:.4g} of {kind} at {place}")
             case "input_delay" if joint >= 0:
-                settings.add(joint, "delay", values["T_d"])
+                self._add(joint, "delay", values["T_d"])
             case "integral_action" if driven >= 0 and kp > 0.0 and has_integral_gain:
-                settings.add(joint, "integral_gain", gear**2 * kp * values["r_i"])
+                self._add(joint, "integral_gain", gear**2 * kp * values["r_i"])
             case _:
-                settings.without_field.append(reported)
-                continue
-        settings.written.append(reported)
+                self.without_field.append(reported)
+                return
+        self.written.append(reported)
 
 
 def isaac_settings(model: Model, source: Path, step: float | None = None) -> WrittenBack:

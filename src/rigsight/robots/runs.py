@@ -119,10 +119,8 @@ def _ours(
     values = {name: 0.0 if name in dry else value for name, value in draft.values.items()}
     held = {control: reported[index] for control, index in draft.controls.items() if index >= 0}
     # A record has a signal, also of a model without actuators.
-    shown = [signal.name for signal in (*rig.inputs, *rig.outputs)]
-    signals = {name: np.full(SAMPLES, held.get(name, 0.0)) for name in shown}
-    units = {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}
-    record = Record("free run", STEP * STEPS_PER_SAMPLE, signals, units, hold="zoh")
+    signals = {name: np.full(SAMPLES, held.get(name, 0.0)) for name in rig.signal_units}
+    record = Record("free run", STEP * STEPS_PER_SAMPLE, signals, rig.signal_units, hold="zoh")
     state = np.array([{**start, **rates}.get(state.name, 0.0) for state in structure.states])
     out = simulate(structure, values, record, state, _ACCURACY)
     return {name: out[f"{_WATCHED}{name}"] for name in start}

@@ -40,6 +40,16 @@ class TreeJoint:
     anchor: Floats
     reference: float  # coordinate at which the body stands as the model draws it
 
+    @property
+    def way_unit(self) -> str:
+        """Unit of its coordinate."""
+        return "m" if self.slides else "rad"
+
+    @property
+    def force_unit(self) -> str:
+        """Unit of a force along its coordinate."""
+        return "N" if self.slides else "N m"
+
 
 @dataclass(frozen=True)
 class TreeBody:

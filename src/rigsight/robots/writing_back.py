@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Set
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,10 +12,9 @@ import numpy as np
 
 from rigsight.effects import Effect, kind_of
 from rigsight.errors import InputError
-from rigsight.rigs import Rig
-from rigsight.robots.declared_numbers import Field
 from rigsight.robots.draft import Gear, RigDraft, RobotFile, read_robot
 from rigsight.robots.effect_fields import EFFECT_FIELDS
+from rigsight.robots.tables import Field
 from rigsight.simulate.model import Model
 
 if TYPE_CHECKING:
@@ -170,24 +169,16 @@ class _Writer:
 
     def write_gear(self, place: str, gear: Gear, model: Model) -> None:
         first = self._elements["joint"][gear.joint]
-        stiffness, damping = (model.values[f"{place}_{what}"] for what in ("stiffness", "damping"))
-        structure = model.structure
-        loose = [effect for effect in model.effects if _is_play_at(effect, structure.rig, {place})]
-        play = structure.values_of(loose[0], model.values)["g"] if loose else 0.0
-        name = add_second_joint(self._spec, first, stiffness, damping, play)
+        at_places = (in_words(effect, model) for effect in model.effects)
+        play = next((own["g"] for kind, at, own, _ in at_places if (kind, at) == ("free_play", place)), 0.0)
+        added = add_second_joint(self._spec, first, place, model.values, play)
         reported = f", range +-{play:.4g} (free_play at {place})" if play > 0.0 else ""
-        self._written.append(
-            f"joint '{name}' behind '{first.name}': stiffness {stiffness:.4g}, damping {damping:.4g}{reported}"
-        )
+        self._written.append(f"{added}{reported}")
 
     def write_effect(self, effect: Effect, model: Model) -> None:
-        structure = model.structure
-        if _is_play_at(effect, structure.rig, self._draft.gears.keys()):
+        kind, place, values, reported = in_words(effect, model)
+        if kind == "free_play" and place in self._draft.gears:
             return
-        place, kind = structure.rig.acts_at(effect), kind_of(effect.name)
-        values = structure.values_of(effect, model.values)
-        numbers = ", ".join(f"{own} = {value:.4g}" for own, value in values.items())
-        reported = f"{kind} at {place} ({numbers})"
         field = EFFECT_FIELDS.get(kind)
         places = {"joint": self._draft.joints, "actuator": self._draft.drives, "sensor": self._draft.sensors}
         index = -1 if field is None else places[field.element].get(place, -1)
@@ -217,30 +208,37 @@ class _Writer:
         return WrittenModel(f"<!-- {comment} -->\n{text}", written, without_field, model, self._draft)
 
 
-def _is_play_at(effect: Effect, rig: Rig, places: Set[str]) -> bool:
-    return kind_of(effect.name) == "free_play" and rig.acts_at(effect) in places
+def in_words(effect: Effect, model: Model) -> tuple[str, str, dict[str, float], str]:
+    """Return the kind of an effect of a model, its place and values, and all of these in words."""
+    place, kind = model.structure.rig.acts_at(effect), kind_of(effect.name)
+    values = model.structure.values_of(effect, model.values)
+    numbers = ", ".join(f"{own} = {value:.4g}" for own, value in values.items())
+    return kind, place, values, f"{kind} at {place} ({numbers})"
 
 
 def with_gears(spec: mujoco.MjSpec, draft: RigDraft) -> mujoco.MjModel:
     """Return the compiled model with the second joint of each gear, as a spring."""
     joints = {joint.id: joint for joint in spec.joints}
     for place, gear in draft.gears.items():
-        stiffness, damping = (draft.values[f"{place}_{what}"] for what in ("stiffness", "damping"))
-        add_second_joint(spec, joints[gear.joint], stiffness, damping, 0.0)
+        add_second_joint(spec, joints[gear.joint], place, draft.values, 0.0)
     return spec.compile()
 
 
-def add_second_joint(spec: mujoco.MjSpec, first: Any, stiffness: float, damping: float, play: float) -> str:
-    """Add what lies between a rotor and its body to a MuJoCo model, and return the name of the joint."""
+def add_second_joint(
+    spec: mujoco.MjSpec, first: Any, place: str, values: Mapping[str, float], play: float
+) -> str:
+    """Add what lies between a rotor and its body to a MuJoCo model, and return it in words."""
     # Without play it is a spring. With play the spring acts beyond a range, as the limit of the joint, whose stiffness MuJoCo
     # counts by the inertia that it moves.
     import mujoco
 
     name = f"{first.name}_play"
+    stiffness, damping = (values[f"{place}_{what}"] for what in ("stiffness", "damping"))
+    added = f"joint '{name}' behind '{first.name}': stiffness {stiffness:.4g}, damping {damping:.4g}"
     second = first.parent.add_joint(name=name, type=first.type, axis=list(first.axis), pos=list(first.pos))
     if play <= 0.0:
         second.stiffness[0], second.damping[0] = stiffness, damping
-        return name
+        return added
     in_degrees = bool(spec.compiler.degree) and first.type == mujoco.mjtJoint.mjJNT_HINGE
     half = math.degrees(play) if in_degrees else play
     second.range[:] = (-half, half)
@@ -256,4 +254,4 @@ def add_second_joint(spec: mujoco.MjSpec, first: Any, stiffness: float, damping:
     free = 1.0 - _IMPEDANCE
     second.solimp_limit[:2] = (_IMPEDANCE, _IMPEDANCE)
     second.solref_limit[:] = (-stiffness * free / moved, -damping * free / moved)
-    return name
+    return added

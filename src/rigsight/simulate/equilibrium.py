@@ -56,12 +56,8 @@ def rest_state(structure: Structure, p: Floats, held: HeldInput) -> Floats:
     slowly from zero, so that hysteresis and friction hold the same forces as on a rig. A rig without a spring has no equilibrium
     and starts at its rest position.
     """
-    states = structure.states
-    given = {
-        states.index(symbol): _value(structure, p, value)
-        for symbol, value in structure.rig.mechanism.initial.items()
-        if symbol in states
-    }
+    states, initial = structure.states, structure.rig.mechanism.initial.items()
+    given = {states.index(own): _value(structure, p, value) for own, value in initial if own in states}
     moving = {states.index(rate) for rate in structure.tree.motion.velocities}
     if has_raisable_damping(structure.rig) and not set(given) - moving:
         state = _risen(structure, p, held)

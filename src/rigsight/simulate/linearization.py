@@ -81,18 +81,6 @@ class Linearization:
         return found[np.lexsort((found.imag, np.array([float(f"{abs(pole):.9g}") for pole in found])))]
 
     @property
-    def natural_frequencies(self) -> Floats:
-        """Size of each pole [rad/s], shape (n_states,)."""
-        return np.abs(self.poles)
-
-    @property
-    def damping_ratios(self) -> Floats:
-        """Damping ratio of each pole, negative for an unstable pole and NaN for a pole at zero, shape (n_states,)."""
-        size = self.natural_frequencies
-        safe = np.where(size > self._rounding, size, np.nan)
-        return np.asarray(-self.poles.real / safe)
-
-    @property
     def stability(self) -> Stability:
         """Stability from the poles."""
         # ``"drifts"`` if a pole is zero, so that the rig does not return; ``"undamped"`` if others are on the imaginary axis.
@@ -207,17 +195,14 @@ def linearize(
     else:
         at_state = np.append(np.asarray(state, dtype=np.float64), unchanged)
     try:
-        slopes = functions.at(at_state, at_inputs, p)
+        (A, direct), (C, D), rests = functions.at(at_state, at_inputs, p)
     except np.linalg.LinAlgError:
         raise SimulationError(
             f"The mass matrix of {structure.rig.name} is singular at the equilibrium."
         ) from None
-    A, direct = slopes.states, slopes.inputs
     # z = x - E_0 u - E_1 u' eliminates the rates of the inputs from the equations.
     E_1 = direct[2]
     E_0 = A @ E_1 + direct[1]
-    C = slopes.outputs_by_states
-    D = slopes.outputs_by_inputs
     B, through = direct[0] + A @ E_0, np.stack([D[0] + C @ E_0, D[1] + C @ E_1, D[2]])
     n, n_outputs = len(structure.states), len(structure.rig.outputs)
     known = dict(zip(structure.parameter_symbols, p, strict=True))
@@ -235,7 +220,7 @@ def linearize(
         outputs=tuple(signal.name for signal in structure.rig.outputs),
         at_inputs=at_inputs,
         at_state=at_state[:n],
-        rests=slopes.rests,
+        rests=rests,
         state_matrix=A[:n, :n],
         input_matrix=B[:n],
         output_matrix=C[:n_outputs, :n],

@@ -53,9 +53,7 @@ def simulate_sets(
             status, out, _ = kernel_of(structure).simulate_one(held, own, begin, tolerance, n_samples)
             sets.append(out if status == 0 else np.full_like(out, np.nan))
         return as_measured(structure, p, np.stack(sets, axis=2), held)
-    steps = Substeps.per_piece(
-        substeps if isinstance(substeps, Substeps) else Substeps(substeps), held.n_pieces
-    )
+    steps = Substeps.of(substeps).per_piece(held.n_pieces)
     out = kernel_of(structure).simulate_lanes(held, p, initial_states, steps, n_samples)
     return as_measured(structure, p, out, held)
 
@@ -94,9 +92,7 @@ def simulate_tangents(
     record;
     that of the result is (n_samples, n_outputs, 1 + n_directions): the outputs, then their derivatives.
     """
-    steps = Substeps.per_piece(
-        substeps if isinstance(substeps, Substeps) else Substeps(substeps), held.n_pieces
-    )
+    steps = Substeps.of(substeps).per_piece(held.n_pieces)
     return kernel_of(structure).simulate_tangents(held, p, dp, initial_state, initial_slope, steps, n_samples)
 
 
@@ -163,6 +159,11 @@ class Substeps(int):
         made.needs = needs
         made._schedule = None
         return made
+
+    @classmethod
+    def of(cls, substeps: int) -> Substeps:
+        """Return the schedule, or one of the same number of steps in every piece."""
+        return substeps if isinstance(substeps, Substeps) else cls(substeps)
 
     @property
     def mean(self) -> float:

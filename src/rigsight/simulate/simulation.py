@@ -43,10 +43,9 @@ def record_input(structure: Structure, record: Record) -> HeldInput:
     if not structure.n_inputs:
         # A rig without inputs still needs the division of time into pieces.
         return hold_input(np.zeros(record.n_samples), record.dt, "zoh")
-    prescribing = {coordinate.prescribed_by for coordinate in mechanism.prescribed}
 
     def held(index: int, name: str) -> HeldInput:
-        if name not in prescribing:
+        if name not in mechanism.prescribing:
             return hold_input(record[name], record.dt, record.hold)
         if index in structure.accelerating_inputs:
             return hold_accelerated_motion(*accelerated_motion(record[name], record.dt), record.dt)

@@ -1,34 +1,23 @@
-"""Content of a rig file: its tables, parsed expressions, and the position of each for messages."""
+"""Content of a rig file: its tables and keys, parsed expressions, and the position of each for messages."""
 
 from __future__ import annotations
 
-import math
-import operator
-from collections.abc import Callable, Collection, Mapping
-from typing import Any, NoReturn
+from collections.abc import Collection, Mapping
+from typing import Annotated, Any, NoReturn, get_args, get_origin
 
 import sympy as sp
-from lark import Token, Tree
-from pydantic import ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from rigsight.errors import InputError, nearest
+from rigsight.errors import InputError, nearest, shown
 from rigsight.rigs.parts import reading_symbol
 from rigsight.rigs.reading.expressions import (
-    FUNCTIONS,
-    MOST_POWER,
-    READS,
     Expression,
     ExpressionError,
     force_name,
     parsed,
-    place_of,
     rate_name,
+    to_sympy,
 )
-from rigsight.rigs.reading.rig_tables import RigTable, path_and_sentence
-
-_LARGEST = 1e300
-"""Largest constant; products of a few of them leave the range of numbers."""
-
 
 Path = tuple[str | int, ...]
 
@@ -45,6 +34,120 @@ _EXPRESSIONS: Mapping[str, tuple[str, ...]] = {
 }
 """Keys of each table whose values are expressions."""
 _LONGEST_QUOTE = 60
+
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Text = Annotated[str, Field(max_length=5000)]
+Formula = Text | Number
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class _InputTable(_Table):
+    unit: Text
+    about: Text = ""
+
+
+class ConstantTable(_Table):
+    """``[constants.NAME]``: a known number."""
+
+    unit: Text
+    about: Text = ""
+    lower: Number | None = None
+    upper: Number | None = None
+    default: Number | None = None
+
+
+class ParameterTable(ConstantTable):
+    """``[parameters.NAME]``: a number to identify."""
+
+    log: bool = False
+
+
+class _AlternativeTable(ConstantTable):
+    gives: Text
+    value: Formula
+
+
+class _CoordinateTable(_Table):
+    unit: Text
+    about: Text = ""
+    prescribed_by: Text | None = None
+    rate: Text | None = None
+
+
+class _EnergyTable(_Table):
+    kinetic: Formula = 0.0
+    potential: Formula = 0.0
+
+
+class _JointTable(_Table):
+    motion: Formula
+    stiffness: Formula = 0.0
+    damping: Formula = 0.0
+    rest: Formula = 0.0
+    force: Formula = 0.0
+    inertia: Formula | None = None
+    damps_spring: bool = False
+    about: Text = ""
+
+
+class _DriveTable(_Table):
+    signal: Formula
+    force: Formula
+    along: Formula
+    about: Text = ""
+
+
+class _SensorTable(_Table):
+    reads: Formula
+    unit: Text
+    about: Text = ""
+    upper_cut: Annotated[Number, Field(gt=0.0)] | None = None
+
+
+class _StateTable(_Table):
+    rate: Formula
+    unit: Text
+    start: Formula | None = None
+    about: Text = ""
+
+
+class SimulatorTable(_Table):
+    """``[simulator]``: another program that moves bodies, its model, and what coordinates and parameters are called there."""
+
+    kind: Text
+    file: Text
+    digest: Text | None = None
+    without_armature: bool = False
+    step: Annotated[Number, Field(gt=0.0)] | None = None
+    coordinates: dict[str, Text] = {}
+    parameters: dict[str, Text] = {}
+    states: dict[str, Text] = {}
+    rates: dict[str, Text] = {}
+    forces: dict[str, Text] = {}
+
+
+class RigTable(_Table):
+    """The whole file."""
+
+    name: Annotated[str, Field(min_length=1, max_length=100)]
+    summary: Text = ""
+    inputs: dict[str, _InputTable] = {}
+    constants: dict[str, ConstantTable] = {}
+    parameters: dict[str, ParameterTable] = {}
+    alternatives: dict[str, _AlternativeTable] = {}
+    coordinates: dict[str, _CoordinateTable] = {}
+    energy: _EnergyTable = _EnergyTable()
+    simulator: SimulatorTable | None = None
+    joints: dict[str, _JointTable] = {}
+    drives: dict[str, _DriveTable] = {}
+    sensors: dict[str, _SensorTable] = {}
+    states: dict[str, _StateTable] = {}
+    signals: dict[str, Formula] = {}
+    initial: dict[str, Formula] = {}
 
 
 class Declaration:
@@ -66,7 +169,12 @@ class Declaration:
             self.refuse(*path_and_sentence(first))
         self.expressions: dict[Path, Expression] = {}
         self._parse()
-        self.symbols = self._declared_symbols()
+        names = [*self.names(*NAMED, "sensors"), *map(force_name, self.table.joints)]
+        written = dict(zip(names, names, strict=True))
+        written |= {
+            rate_name(name): own.rate or rate_name(name) for name, own in self.table.coordinates.items()
+        }
+        self.symbols = {name: sp.Symbol(symbol, real=True) for name, symbol in written.items()}
 
     def refuse(self, path: Path, message: str, within: int | None = None) -> NoReturn:
         """Raise a message with the place of a value, or of the nearest table around it."""
@@ -139,92 +247,48 @@ class Declaration:
         except ExpressionError as error:
             self.refuse(path, f"{error}, in '{quoted(text)}'" if text.strip() else str(error), error.place)
 
-    def _declared_symbols(self) -> dict[str, sp.Symbol]:
-        names = [*self.names(*NAMED, "sensors"), *map(force_name, self.table.joints)]
-        rates = {rate_name(name): own.rate or rate_name(name) for name, own in self.table.coordinates.items()}
-        written = dict(zip(names, names, strict=True)) | rates
-        return {name: sp.Symbol(symbol, real=True) for name, symbol in written.items()}
-
 
 def quoted(text: str) -> str:
     """Return the text of an expression as messages quote it."""
     return text if len(text) <= _LONGEST_QUOTE else f"{text[: _LONGEST_QUOTE - 3]}..."
 
 
-def to_sympy(expression: Expression, symbols: Mapping[str, sp.Expr]) -> sp.Expr:
-    """Return an expression as sympy sees it."""
-    built = _built(expression.tree, symbols)
-    if built.has(sp.I, sp.nan, sp.zoo, sp.oo):
-        raise ExpressionError("this has no real value")
-    return built
-
-
-def _built(node: Tree[Token] | Token, symbols: Mapping[str, sp.Expr]) -> sp.Expr:
-    value, place = _of_node(node, symbols), place_of(node)
-    size = value if value.is_Rational else sp.S.Zero
-    if value.is_number and not value.is_Rational:
-        try:
-            number = complex(value)
-        except (OverflowError, TypeError, ValueError):
-            raise ExpressionError("a number is too large or undefined", place) from None
-        if number.imag != 0.0 or math.isnan(number.real):
-            raise ExpressionError("this has no real value", place)
-        size = number.real
-    if abs(size) > _LARGEST:
-        raise ExpressionError("a number is too large", place)
-    return value
-
-
-def _of_node(node: Tree[Token] | Token, symbols: Mapping[str, sp.Expr]) -> sp.Expr:
-    assert isinstance(node, Tree)
-    if node.data == "number":
-        return _number(str(node.children[0]), place_of(node))
-    if node.data in READS:
-        written = READS[str(node.data)](str(node.children[0]))
-        if written not in symbols:
-            raise ExpressionError(
-                f"'{written}' is not known here.{nearest(written, symbols)}", place_of(node)
-            )
-        return symbols[written]
-    if node.data == "call":
-        name, *arguments = node.children
-        return FUNCTIONS[str(name)].build(*(_built(argument, symbols) for argument in arguments))
-    parts = [_built(child, symbols) for child in node.children]
-    if node.data == "over" and parts[0].is_zero:
-        raise ExpressionError("a division by zero", place_of(node.children[0]))
-    if node.data in _OPERATIONS:
-        return _OPERATIONS[str(node.data)](*parts)
-    base, exponent = parts
-    if exponent.is_number and abs(float(exponent)) > MOST_POWER:
-        raise ExpressionError(
-            f"an exponent must be within +-{MOST_POWER}, this one is {float(exponent):g}",
-            place_of(node.children[1]),
-        )
-    power = base**exponent
-    if power.is_Pow and power.exp.is_number and abs(float(power.exp)) > MOST_POWER:
-        raise ExpressionError(
-            f"powers of powers must stay within +-{MOST_POWER}, this is the {float(power.exp):g}th",
-            place_of(node),
-        )
-    return power
-
-
-_OPERATIONS: Mapping[str, Callable[..., sp.Expr]] = {
-    "sum": sp.Add,
-    "product": sp.Mul,
-    "negative": operator.neg,
-    "minus": operator.neg,
-    "plus": operator.pos,
-    "times": operator.pos,
-    "over": lambda below: 1 / below,
+_WANTED = {
+    "string_type": "text in quotes",
+    "string_too_short": "at least one character",
+    "float_type": "a number without quotes, as 0.05",
+    "finite_number": "a finite number",
+    "bool_type": "true or false without quotes",
 }
+_FORMULA = "constrained-str"
+"""What pydantic appends to the path of a formula that is no text."""
 
 
-def _number(text: str, place: int) -> sp.Expr:
-    """Return a number: whole ones stay whole, as powers of symbols need them."""
-    value = float(text)
-    if math.isinf(value):
-        raise ExpressionError(f"{text} is too large", place)
-    if text.isdigit() and len(text) <= 15:
-        return sp.Integer(int(text))
-    return sp.Integer(int(value)) if value.is_integer() and abs(value) < 1e15 else sp.Float(value)
+def path_and_sentence(error: Any) -> tuple[tuple[str | int, ...], str]:
+    """Return the path of what pydantic found, and one sentence for it."""
+    path = tuple(error["loc"])
+    key = str(path[-1]) if path else ""
+    if error["type"] == "extra_forbidden":
+        allowed = _keys_at(path[:-1])
+        known = f"{nearest(key, allowed)} Allowed: {', '.join(allowed)}"
+        return path, f"'{key}' is not a key of this table.{known}"
+    if error["type"] == "missing":
+        return path[:-1], f"the line '{key} = ...' is missing"
+    if error["type"] == "string_too_long":
+        most, count = error["ctx"]["max_length"], len(error["input"])
+        own = path[:-1] if key == _FORMULA else path
+        return own, f"it may have at most {most} characters but has {count}"
+    got = shown(error.get("input"))
+    if error["type"] in ("model_type", "dict_type", "model_attributes_type"):
+        return path, f"this is a table: write [{'.'.join(map(str, path))}] and its keys below, got {got}"
+    if key in (_FORMULA, "float"):
+        return path[:-1], f"expected an expression in quotes or a number, got {got}"
+    return path, f"expected {_WANTED.get(error['type'], error['msg'])}, got {got}"
+
+
+def _keys_at(path: tuple[str | int, ...]) -> list[str]:
+    table: Any = RigTable
+    for key in path:
+        # A table of named entries holds one kind of table under every name.
+        table = get_args(table)[1] if get_origin(table) is dict else table.model_fields[str(key)].annotation
+    return list(table.model_fields)

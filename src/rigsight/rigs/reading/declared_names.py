@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from rigsight.errors import nearest, shown
 from rigsight.rigs.reading.declaration import NAMED, Declaration, Path
-from rigsight.rigs.reading.expressions import FUNCTIONS, RATE, force_name, is_identifier, rate_name
+from rigsight.rigs.reading.expressions import FUNCTIONS, force_name, is_identifier, rate_name
 
 _LONGEST_NAME = 60
 _NUMBERS = "parameters and constants"
@@ -96,15 +96,13 @@ def _check_references(declaration: Declaration) -> None:
         declaration.check_known(path, "parameter", alternative.gives, table.parameters)
     free = [name for name, own in table.coordinates.items() if own.prescribed_by is None]
     known = [*free, *map(rate_name, free), *table.states]
+    prescribed = [name for name in table.coordinates if name not in free]
     for name in table.initial:
         if name in table.states and table.states[name].start is not None:
             why = f"has two start values: states.{name}.start gives it too; remove one"
         elif name in known:
             continue
-        elif (
-            name in declaration.symbols
-            and name.removeprefix(f"{RATE}(").removesuffix(")") in table.coordinates
-        ):
+        elif name in (*prescribed, *map(rate_name, prescribed)):
             why = "is prescribed by an input, which also gives its start value; remove it"
         else:
             why = f"is not a coordinate, rate or state.{nearest(name, known)} Known: {_listed(known)}"
@@ -128,24 +126,19 @@ def _allowed(declaration: Declaration, path: Path) -> tuple[set[str], str]:
     everything = numbers | motion | rates | names("inputs", "states", "signals", "drives", "sensors")
     match path:
         case ("joints", _, "motion"):
-            found, said = numbers | motion, "the motion of a joint may contain coordinates"
+            return numbers | motion, f"the motion of a joint may contain coordinates, {_NUMBERS}"
         case ("drives", _, "along"):
-            found, said = numbers | motion, "the expression along which a force acts may contain coordinates"
-        case ("energy", "potential"):
-            readable = _with_signals(declaration, numbers | motion)
-            return (
-                readable,
-                f"a potential energy may contain coordinates, {_NUMBERS}, and signals made of these",
+            said = "the expression along which a force acts may contain coordinates"
+            return numbers | motion, f"{said}, {_NUMBERS}"
+        case ("energy", kind):
+            read, said = (
+                (motion | rates, "coordinates, rates") if kind == "kinetic" else (motion, "coordinates")
             )
-        case ("energy", "kinetic"):
-            readable = _with_signals(declaration, numbers | motion | rates)
-            return (
-                readable,
-                f"a kinetic energy may contain coordinates, rates, {_NUMBERS}, and signals made of these",
-            )
+            readable = _with_signals(declaration, numbers | read)
+            return readable, f"a {kind} energy may contain {said}, {_NUMBERS}, and signals made of these"
         case ("joints", _, "force"):
-            found = numbers | motion | rates | names("states", "signals")
-            said = "the force of a joint may contain coordinates, rates, states, signals"
+            said = f"the force of a joint may contain coordinates, rates, states, signals, {_NUMBERS}"
+            return numbers | motion | rates | names("states", "signals"), said
         case ("joints", _, part):
             return numbers, f"the {part} of a joint may contain {_NUMBERS}"
         case ("initial", _) | ("states", _, "start"):
@@ -156,17 +149,16 @@ def _allowed(declaration: Declaration, path: Path) -> tuple[set[str], str]:
             return everything | set(map(force_name, names("joints"))), ""
         case _:
             return everything, ""
-    return found, f"{said}, {_NUMBERS}"
 
 
 def _with_signals(declaration: Declaration, readable: set[str]) -> set[str]:
     """Return names with those of the signals that are made of nothing else, directly or through other signals."""
+    reads = {
+        name: declaration.expressions["signals", name].reads.keys() for name in declaration.table.signals
+    }
     found = set(readable)
-    left = dict.fromkeys(declaration.table.signals)
-    while made := [name for name in left if declaration.expressions["signals", name].reads.keys() <= found]:
-        found.update(made)
-        for name in made:
-            del left[name]
+    while made := {name for name, read in reads.items() if read <= found} - found:
+        found |= made
     return found
 
 

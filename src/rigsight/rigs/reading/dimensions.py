@@ -94,16 +94,10 @@ def _registry() -> Any:
     return registry
 
 
-def unit_of(of: Dimension) -> str:
-    """Return an SI unit of a dimension in base units, for messages."""
-    registry = _registry()
-    powers = registry.UnitsContainer({_BASES[name]: power for name, power in of.items()})
-    return _plain(registry.get_base_units(powers)[1])
-
-
 def measured_in(of: Dimension) -> str:
     """Return ``"in kg m/s^2"``, or that there is no unit, for messages."""
-    unit = unit_of(of)
+    powers = _registry().UnitsContainer({_BASES[name]: power for name, power in of.items()})
+    unit = _plain(_registry().get_base_units(powers)[1])
     return "without a unit (angles have none)" if unit == "1" else f"in {unit}"
 
 

@@ -6,6 +6,8 @@ functions that the simulation knows how to cross (`rigsight.rigs.reading.functio
 
 from __future__ import annotations
 
+import math
+import operator
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -75,6 +77,8 @@ MOST_POWER = 20
 """Largest exponent: no law of mechanics has a larger one, and what is made of one would leave the range of numbers."""
 _DEEPEST_TREE = 120
 """Powers of powers and signs of signs: deeper ones are no formula, and what walks through them would not return."""
+_LARGEST = 1e300
+"""Largest constant; products of a few of them leave the range of numbers."""
 RATE = "d"
 """``d(NAME)`` is the time derivative of a coordinate; a name without parentheses may be a parameter called d."""
 FORCE = "force"
@@ -131,12 +135,10 @@ def parsed(text: str) -> Expression:
 
 
 def _depth(tree: Tree[Token]) -> int:
-    deepest, waiting = 0, [(tree, 1)]
-    while waiting:
-        node, depth = waiting.pop()
-        deepest = max(deepest, depth)
-        waiting += [(child, depth + 1) for child in node.children if isinstance(child, Tree)]
-    return deepest
+    depth, nodes = 0, [tree]
+    while nodes:
+        depth, nodes = depth + 1, [c for node in nodes for c in node.children if isinstance(c, Tree)]
+    return depth
 
 
 def rate_name(name: str) -> str:
@@ -238,3 +240,82 @@ def place_of(node: Tree[Token] | Token) -> int:
         return node.start_pos or 0
     places = [place_of(child) for child in node.children]
     return min(places, default=0)
+
+
+def to_sympy(expression: Expression, symbols: Mapping[str, sp.Expr]) -> sp.Expr:
+    """Return an expression as sympy sees it."""
+    built = _built(expression.tree, symbols)
+    if built.has(sp.I, sp.nan, sp.zoo, sp.oo):
+        raise ExpressionError("this has no real value")
+    return built
+
+
+def _built(node: Tree[Token] | Token, symbols: Mapping[str, sp.Expr]) -> sp.Expr:
+    value, place = _of_node(node, symbols), place_of(node)
+    size = value if value.is_Rational else sp.S.Zero
+    if value.is_number and not value.is_Rational:
+        try:
+            number = complex(value)
+        except (OverflowError, TypeError, ValueError):
+            raise ExpressionError("a number is too large or undefined", place) from None
+        if number.imag != 0.0 or math.isnan(number.real):
+            raise ExpressionError("this has no real value", place)
+        size = number.real
+    if abs(size) > _LARGEST:
+        raise ExpressionError("a number is too large", place)
+    return value
+
+
+def _of_node(node: Tree[Token] | Token, symbols: Mapping[str, sp.Expr]) -> sp.Expr:
+    assert isinstance(node, Tree)
+    if node.data == "number":
+        return _number(str(node.children[0]), place_of(node))
+    if node.data in READS:
+        written = READS[str(node.data)](str(node.children[0]))
+        if written not in symbols:
+            raise ExpressionError(
+                f"'{written}' is not known here.{nearest(written, symbols)}", place_of(node)
+            )
+        return symbols[written]
+    if node.data == "call":
+        name, *arguments = node.children
+        return FUNCTIONS[str(name)].build(*(_built(argument, symbols) for argument in arguments))
+    parts = [_built(child, symbols) for child in node.children]
+    if node.data == "over" and parts[0].is_zero:
+        raise ExpressionError("a division by zero", place_of(node.children[0]))
+    if node.data in _OPERATIONS:
+        return _OPERATIONS[str(node.data)](*parts)
+    base, exponent = parts
+    if exponent.is_number and abs(float(exponent)) > MOST_POWER:
+        raise ExpressionError(
+            f"an exponent must be within +-{MOST_POWER}, this one is {float(exponent):g}",
+            place_of(node.children[1]),
+        )
+    power = base**exponent
+    if power.is_Pow and power.exp.is_number and abs(float(power.exp)) > MOST_POWER:
+        raise ExpressionError(
+            f"powers of powers must stay within +-{MOST_POWER}, this is the {float(power.exp):g}th",
+            place_of(node),
+        )
+    return power
+
+
+_OPERATIONS: Mapping[str, Callable[..., sp.Expr]] = {
+    "sum": sp.Add,
+    "product": sp.Mul,
+    "negative": operator.neg,
+    "minus": operator.neg,
+    "plus": operator.pos,
+    "times": operator.pos,
+    "over": lambda below: 1 / below,
+}
+
+
+def _number(text: str, place: int) -> sp.Expr:
+    """Return a number: whole ones stay whole, as powers of symbols need them."""
+    value = float(text)
+    if math.isinf(value):
+        raise ExpressionError(f"{text} is too large", place)
+    if text.isdigit() and len(text) <= 15:
+        return sp.Integer(int(text))
+    return sp.Integer(int(value)) if value.is_integer() and abs(value) < 1e15 else sp.Float(value)

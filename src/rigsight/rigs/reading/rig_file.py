@@ -16,13 +16,18 @@ import sympy as sp
 from rigsight.errors import InputError, nearest
 from rigsight.parameters import Parameter
 from rigsight.records.formats.known import file_size
-from rigsight.rigs.mechanism import Mechanism
+from rigsight.rigs.mechanism import Mechanism, without_signals
 from rigsight.rigs.parts import READING, Coordinate, Drive, Joint, RateState, Sensor, Signal
-from rigsight.rigs.reading.declaration import DRIVE_PARTS, JOINT_PARTS, Declaration
+from rigsight.rigs.reading.declaration import (
+    DRIVE_PARTS,
+    JOINT_PARTS,
+    ConstantTable,
+    Declaration,
+    ParameterTable,
+)
 from rigsight.rigs.reading.declared_names import check_all_used, check_declared_names, check_names_read
 from rigsight.rigs.reading.dimensions import Units
 from rigsight.rigs.reading.expressions import rate_name
-from rigsight.rigs.reading.rig_tables import ConstantTable, ParameterTable
 from rigsight.rigs.reading.sound_mechanism import check_mechanism
 from rigsight.rigs.reading.toml_places import Path as KeyPath
 from rigsight.rigs.reading.toml_places import Place, toml_tables, value_places
@@ -186,18 +191,19 @@ def _mechanism(declaration: Declaration, order: list[KeyPath]) -> Mechanism:
     table, symbols, sympy = declaration.table, declaration.symbols, declaration.sympy
     signals = {symbols[str(path[1])]: sympy(path) for path in order if path[0] == "signals"}
     bodies = simulated_bodies(declaration)
-    started: list[tuple[KeyPath, str]] = [(("initial", name), name) for name in table.initial]
-    started += [
-        (("states", name, "start"), name) for name, own in table.states.items() if own.start is not None
-    ]
+    started: dict[str, KeyPath] = {name: ("initial", name) for name in table.initial}
+    started |= {
+        name: ("states", name, "start") for name, own in table.states.items() if own.start is not None
+    }
     return Mechanism(
         inputs=tuple(table.inputs),
         coordinates=tuple(
             Coordinate(symbols[name], symbols[rate_name(name)], own.unit, own.prescribed_by, own.about)
             for name, own in table.coordinates.items()
         ),
-        kinetic=_written_out(sympy(("energy", "kinetic")), signals),
-        potential=_written_out(sympy(("energy", "potential")), signals),
+        # Of coordinates and rates alone, as they are differentiated by them.
+        kinetic=without_signals(sympy(("energy", "kinetic")), signals),
+        potential=without_signals(sympy(("energy", "potential")), signals),
         joints=tuple(
             Joint(
                 name,
@@ -221,21 +227,13 @@ def _mechanism(declaration: Declaration, order: list[KeyPath]) -> Mechanism:
             for name, own in table.states.items()
         ),
         signals=signals,
-        initial={symbols[name]: sympy(path) for path, name in started},
+        initial={symbols[name]: sympy(path) for name, path in started.items()},
         order=tuple(str(path[1]) for path in order if path[0] != "signals"),
         bodies=bodies,
         asked=tuple(symbols[name] for name in (*table.simulator.parameters, *table.simulator.states))
         if table.simulator
         else (),
     )
-
-
-def _written_out(energy: sp.Expr, signals: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
-    """Return an energy of coordinates and rates alone, as it is differentiated by them."""
-    known: dict[sp.Symbol, sp.Expr] = {}
-    for symbol, signal in signals.items():
-        known[symbol] = signal.xreplace(known)
-    return energy.xreplace(known)
 
 
 def _parameter(
@@ -262,19 +260,14 @@ def _parameter(
 
 
 def sized_by(name: str, unit: str, mechanism: Mechanism) -> str:
-    """Return the dimension (`rigsight.units`) of a parameter on a rig with one joint; ``""`` where nothing sets its size."""
-    if len(mechanism.joints) == 1 and len(mechanism.coordinates) == 1:
-        joint = mechanism.joints[0]
-        for part, dimension in _OF_A_JOINT.items():
-            if _is(getattr(joint, part), name):
-                return dimension
-        if mechanism.free and _is(mechanism.mass_matrix[0, 0], name):
-            return "force time^2 x^-1"
+    """Return the dimension (`rigsight.units`) of a parameter on a rig with one motion; ``""`` where nothing sets its size."""
+    joint, own = mechanism.joints[0], sp.Symbol(name, real=True)
+    for part, dimension in _OF_A_JOINT.items():
+        if getattr(joint, part) in (own, -own):
+            return dimension
+    if mechanism.free and mechanism.mass_matrix[0, 0] in (own, -own):
+        return "force time^2 x^-1"
     return "length" if any(unit == state.unit for state in mechanism.states) else ""
-
-
-def _is(expression: sp.Expr, name: str) -> bool:
-    return expression in (sp.Symbol(name, real=True), -sp.Symbol(name, real=True))
 
 
 def check_simulator(declaration: Declaration) -> None:
@@ -300,18 +293,18 @@ def check_simulator(declaration: Declaration) -> None:
         declaration.refuse(
             (_SIMULATOR, "digest"), "it is of a model's file, and a Python function has none; remove it"
         )
-    for key in ("coordinates", "rates", "forces"):
-        for name in getattr(own, key):
+    for key in ("coordinates", "rates", "forces", "parameters"):
+        called = getattr(own, key)
+        for name in called if key != "parameters" else ():
             declaration.check_known((_SIMULATOR, key, name), "coordinate", name, free)
-        names = list(getattr(own, key).values())
-        for name, there in getattr(own, key).items():
-            if names.count(there) > 1:
-                declaration.refuse((_SIMULATOR, key, name), f"'{there}' is used twice; each needs its own")
-    for name, there in own.parameters.items():
-        if list(own.parameters.values()).count(there) > 1:
-            declaration.refuse(
-                (_SIMULATOR, "parameters", name), f"'{there}' is given by two numbers; remove one"
-            )
+        why = (
+            "is given by two numbers; remove one"
+            if key == "parameters"
+            else "is used twice; each needs its own"
+        )
+        for name, there in called.items():
+            if list(called.values()).count(there) > 1:
+                declaration.refuse((_SIMULATOR, key, name), f"'{there}' {why}")
     for name in own.states:
         declaration.check_known((_SIMULATOR, "states", name), "state", name, table.states)
     numbers = declaration.names("constants", "parameters")

@@ -83,9 +83,8 @@ def _check_that_forces_act(declaration: Declaration, mechanism: Mechanism) -> No
 
 
 def _check_sensors(declaration: Declaration, mechanism: Mechanism) -> None:
-    moving = {c.symbol for c in mechanism.coordinates} | {c.rate for c in mechanism.coordinates}
-    moving |= {state.symbol for state in mechanism.states}
-    moving |= {force_symbol(joint.name) for joint in mechanism.joints}
+    moving = {symbol for c in mechanism.coordinates for symbol in (c.symbol, c.rate)}
+    moving |= {state.symbol for state in mechanism.states} | {force_symbol(j.name) for j in mechanism.joints}
     for sensor in mechanism.sensors:
         if not _reached(sensor.reads, mechanism) & moving:
             declaration.refuse(
@@ -97,17 +96,14 @@ def _check_sensors(declaration: Declaration, mechanism: Mechanism) -> None:
 def _check_feedback(declaration: Declaration, mechanism: Mechanism) -> None:
     """Refuse the force of a joint where it would act on the motion: it holds the acceleration's own causes."""
     forces = {force_symbol(joint.name) for joint in mechanism.joints}
-    fed_back = {
-        **{("joints", joint.name, "force"): joint.force for joint in mechanism.joints},
-        **{("drives", drive.name, "signal"): drive.signal for drive in mechanism.drives},
-        **{("drives", drive.name, "force"): drive.force for drive in mechanism.drives},
-        **{("states", state.name, "rate"): state.rate for state in mechanism.states},
-    }
+    fed_back = {("joints", joint.name, "force"): joint.force for joint in mechanism.joints}
+    fed_back |= {("drives", drive.name, "signal"): drive.signal for drive in mechanism.drives}
+    fed_back |= {("drives", drive.name, "force"): drive.force for drive in mechanism.drives}
+    fed_back |= {("states", state.name, "rate"): state.rate for state in mechanism.states}
     for path, expression in fed_back.items():
         if _reached(expression, mechanism) & forces:
-            declaration.refuse(
-                path, "it reads the force of a joint, which a sensor can record but which cannot be fed back"
-            )
+            why = "it reads the force of a joint, which a sensor can record but which cannot be fed back"
+            declaration.refuse(path, why)
 
 
 def _reached(expression: sp.Expr, mechanism: Mechanism) -> set[sp.Symbol]:
@@ -116,13 +112,9 @@ def _reached(expression: sp.Expr, mechanism: Mechanism) -> set[sp.Symbol]:
     through |= {sp.Symbol(drive.name, real=True): drive.signal for drive in mechanism.drives}
     through |= {reading_symbol(sensor.name): sensor.reads for sensor in mechanism.sensors}
     found: set[sp.Symbol] = set()
-    waiting = list(expression.free_symbols)
-    while waiting:
-        symbol = waiting.pop()
-        if symbol not in found:
-            found.add(symbol)
-            if symbol in through:
-                waiting.extend(through[symbol].free_symbols)
+    while more := expression.free_symbols - found:
+        found |= more
+        expression = sp.Tuple(*(through[symbol] for symbol in more if symbol in through))
     return found
 
 
@@ -139,9 +131,7 @@ def is_quadratic(mechanism: Mechanism) -> bool:
         numbers, a, b = (rng.uniform(0.5, 2.0, len(own)) for own in (others, rates, rates))
         parts = np.array([_number(energy, numbers, r) for r in (a + b, a - b, a, b)])
         if np.all(np.isfinite(parts)):
-            found.append(
-                abs(parts @ (1.0, 1.0, -2.0, -2.0)) <= _ROUNDING * np.sum(np.abs(parts)),
-            )
+            found.append(abs(parts @ (1.0, 1.0, -2.0, -2.0)) <= _ROUNDING * np.sum(np.abs(parts)))
     return bool(found) and all(found)
 
 
@@ -182,10 +172,6 @@ def dependent_coordinates(mechanism: Mechanism) -> tuple[str, ...]:
 
 def negative_coordinates(mechanism: Mechanism) -> tuple[str, ...]:
     """Return the degrees of freedom whose own inertia is negative whatever the parameters; none for a sound rig."""
-    found, places = [], {c.symbol for c in mechanism.coordinates}
-    for index, coordinate in enumerate(mechanism.free):
-        inertia = mechanism.mass_matrix[index, index]
-        positive = {s: sp.Symbol(s.name, positive=True) for s in inertia.free_symbols - places}
-        if inertia.xreplace(positive).is_negative:
-            found.append(coordinate.name)
-    return tuple(found)
+    places, mass = {c.symbol for c in mechanism.coordinates}, mechanism.mass_matrix
+    positive = {s: sp.Symbol(s.name, positive=True) for s in mass.free_symbols - places}
+    return tuple(c.name for i, c in enumerate(mechanism.free) if mass[i, i].xreplace(positive).is_negative)

@@ -98,9 +98,7 @@ class Kernel:
         steps: NDArray[np.intc] | None = None,
     ) -> tuple[int, Floats, Floats]:
         """Advance one parameter set accurately."""
-        c, p = _doubles(held.coefficients), _doubles(p)
-        x = np.zeros(self._n_states)
-        x[: state.size] = state
+        c, p, x = _doubles(held.coefficients), _doubles(p), self._states(state, 0)
         out = np.zeros((n_samples, self._n_computed))
         status = self._one(
             c.ctypes.data, c.shape[0] - 1, held.interval, held.per_sample, int(held.continuous), 0.0,
@@ -114,10 +112,8 @@ class Kernel:
         self, held: HeldInput, p: Floats, states: Floats, substeps: NDArray[np.intc], n_samples: int
     ) -> Floats:
         """Advance many parameter sets side by side."""
-        c, p = _doubles(held.coefficients), _doubles(p)
+        c, p, x = _doubles(held.coefficients), _doubles(p), self._states(states, 0)
         n_sets = p.shape[1]
-        x = np.zeros((self._n_states, n_sets))
-        x[: states.shape[0]] = states
         out = np.empty((n_samples, self._n_computed, n_sets))
         self._lanes(
             c.ctypes.data, c.shape[0] - 1, held.interval, held.per_sample, substeps.ctypes.data, 0.0,
@@ -133,12 +129,8 @@ class Kernel:
         Parameters have the shape (n_parameters, n_sets), states (n_records, n_states, n_sets). Readings of delayed sensors are
         those before the delay, which is applied after a simulation.
         """
-        n_sets = p.shape[1]
-        x = np.zeros((len(records), self._n_states, n_sets))
-        x[:, : states.shape[1]] = states
-        p = _doubles(p)
-        products = np.empty((len(records), n_sets, n_sets))
-        listed = (_FittedRecord * len(records))(*(record.as_c for record in records))
+        n_sets, p, x = p.shape[1], _doubles(p), self._states(states, 1)
+        products, listed = np.empty((len(records), n_sets, n_sets)), _listed(records)
         failed = self._normal(
             ctypes.addressof(listed), len(records), p.ctypes.data, p.shape[0], n_sets, x.ctypes.data,
             products.ctypes.data,
@@ -172,6 +164,12 @@ class Kernel:
         self._carry([record], p, dp, state[None], dstate, None, out.ctypes.data)
         return out
 
+    def _states(self, states: Floats, axis: int) -> Floats:
+        """Return states with as many along an axis as a kernel has, which is one at least."""
+        x = np.zeros((*states.shape[:axis], self._n_states, *states.shape[axis + 1 :]))
+        x[(slice(None),) * axis + (slice(states.shape[axis]),)] = states
+        return x
+
     def _check_bodies(self) -> None:
         """Raise the error that another simulator reported while the kernel called it."""
         if self._bodies is not None:
@@ -181,13 +179,8 @@ class Kernel:
         self, records: Sequence[FittedRecord], p: Floats, dp: Floats, states: Floats, dstates: Floats,
         products: int | None, out: int | None,
     ) -> None:  # fmt: skip
-        n_directions, n_states = dp.shape[1], states.shape[1]
-        x = np.zeros((len(records), self._n_states))
-        x[:, :n_states] = states
-        dx = np.zeros((self._n_states, n_directions))
-        dx[:n_states] = dstates
-        p, dp = _doubles(p), _doubles(dp)
-        listed = (_FittedRecord * len(records))(*(record.as_c for record in records))
+        n_directions, x, dx = dp.shape[1], self._states(states, 1), self._states(dstates, 0)
+        p, dp, listed = _doubles(p), _doubles(dp), _listed(records)
         failed = self._tangents(
             ctypes.addressof(listed), len(records), p.ctypes.data, dp.ctypes.data, p.size, x.ctypes.data, dx.ctypes.data,
             n_directions, products, out,
@@ -206,6 +199,10 @@ def _function(library: ctypes.CDLL, name: str, arguments: str, result: Any = cty
 
 def _doubles(values: Any) -> Floats:
     return np.ascontiguousarray(values, dtype=np.float64)
+
+
+def _listed(records: Sequence[FittedRecord]) -> Any:
+    return (_FittedRecord * len(records))(*(record.as_c for record in records))
 
 
 def kernel_of(structure: Structure) -> Kernel:
@@ -246,8 +243,3 @@ def _text(structure: Structure) -> str:
     if text is None:
         text = _texts[structure] = kernel_source(structure)
     return text
-
-
-def compile_kernels(structure: Structure) -> None:
-    """Compile the kernels of a structure and keep them on disk."""
-    kernel_of(structure)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 
 import sympy as sp
 
-from rigsight.effects.symbols import derivative
+from rigsight.effects.symbols import rate_along
 from rigsight.libraries.templates import filled, template
 from rigsight.simulate.equations.kinks import FrozenStructure, freeze
 from rigsight.simulate.equations.straight_line import gathered, hoist_constants
-from rigsight.simulate.equations.structure import TIME, LateInput, Structure, input_symbols
+from rigsight.simulate.equations.structure import TIME, LateInput, Structure, input_rates, input_symbols
 from rigsight.simulate.printing.language import FUNCTIONS, elements, function_body, limited, real
 
 
@@ -79,11 +79,10 @@ class KernelEquations:
             "N_DEGREES": len(structure.tree.motion.coordinates),
             "N_FRICTIONS": len(frictions),
             "SIZE_FRICTIONS": max(1, len(frictions)),
-            "FRICTION_MODES": ", ".join(str(own.mode) for own in frictions) or "0",
-            "FRICTION_VELOCITIES": ", ".join(
-                "-1" if own.velocity is None else str(own.velocity) for own in frictions
-            )
-            or "-1",
+            "FRICTION_MODES": _array(own.mode for own in frictions),
+            "FRICTION_VELOCITIES": _array(
+                (-1 if f.velocity is None else f.velocity for f in frictions), "-1"
+            ),
             "FRICTION_IS_SHOWN": int(self.friction_is_shown),
             "VELOCITY": (structure.velocity_index or 0) if single is None else single.velocity,
             "N_ARRIVING": len(self._delays),
@@ -96,7 +95,7 @@ class KernelEquations:
             "DELAYS": self._body("q by", "by", self._groups["delays"]),
             "HAS_LIMITS": int(bool(self.limits) and n_modes > 0),
             "N_DEPENDENT": len(dependent),
-            "DEPENDENT_MODES": ", ".join(map(str, dependent)) or "0",
+            "DEPENDENT_MODES": _array(dependent),
             "PARAMETERS": parameters,
             "PREPARE": function_body(
                 ("p", "q"), elements("q", len(self.constants)), list(self.constants.values()), prepare
@@ -108,7 +107,7 @@ class KernelEquations:
                 [*self._groups["switches"], *self._groups["switch_slopes"]],
                 names,
             ),
-            "PUT_BACK": function_body(("x", "q"), *self._put_back("x", self.limits), names)
+            "PUT_BACK": function_body(("x", "q"), *self._put_back(self.limits), names)
             if self.limits and n_modes > 0
             else "",
             "OUTPUTS": self._body("now x s q y", "y", self._groups["outputs"]),
@@ -129,10 +128,7 @@ class KernelEquations:
         """Return the equations for parameter sets side by side, by their key in the template."""
         structure, names, rates = self.structure, self.lane_names, self.lane_rates
         followers = {i: self.limits[i] for i in self._followed}
-        gained = {
-            i: sp.Symbol(f"x[{i}]", real=True) + real(f"{after}") - real(f"{before}")
-            for i, (before, after) in self._followed.items()
-        }
+        gained = {i: real(f"x[{i}]") + real(now) - real(was) for i, (was, now) in self._followed.items()}
         kept = [limited(gained[i], limit) for i, limit in followers.items()]
         # Symbols without a name are C code already.
         written = {s: s.name for e in kept for s in e.free_symbols if s not in names}
@@ -151,13 +147,13 @@ class KernelEquations:
             "LANE_SPEEDS": self._body("now x q", "g", self._groups["speeds"], lanes=True),
             "LANE_SPEED_SLOPES": self._body("now x k q", "d", slopes, lanes=True),
             "N_INTEGRATED": str(len(integrated)),
-            "INTEGRATED": ", ".join(map(str, integrated)) or "0",
+            "INTEGRATED": _array(integrated),
             "LANE_RATES": self._body("now x q r", "r", rates, lanes=True),
             "LANE_OUTPUTS": self._body("now x q y", "y", self.outputs, lanes=True),
             "LANE_FOLLOWERS": function_body(
-                (), [f"y[{i}]" for i in followers], kept, {**names, **written}, lanes=True
+                (), [f"y[{i}]" for i in followers], kept, names | written, lanes=True
             ),
-            "LANE_PUT_BACK": function_body((), *self._put_back("x", others), names, lanes=True),
+            "LANE_PUT_BACK": function_body((), *self._put_back(others), names, lanes=True),
         }
 
     def _body(
@@ -171,13 +167,9 @@ class KernelEquations:
     @cached_property
     def lane_names(self) -> dict[sp.Symbol, str]:
         """Name in C of each symbol, for sets side by side."""
-        signs = {
-            FrozenStructure.friction_sign(i): f"friction_sign[{i}]"
-            if self.has_several_frictions
-            else "friction_sign"
-            for i in range(len(self.frozen.frictions))
-        }
-        return {**self._names, **signs}
+        form = "friction_sign[{}]" if self.has_several_frictions else "friction_sign"
+        count = len(self.frozen.frictions)
+        return self._names | {FrozenStructure.friction_sign(i): form.format(i) for i in range(count)}
 
     @cached_property
     def _delays(self) -> list[sp.Expr]:
@@ -208,13 +200,8 @@ class KernelEquations:
             }
             late_values = {symbol: late.value for symbol, late in own.items()}
             found[history.symbol] = history.signal.xreplace(late_values)
-            found[rate] = sp.Add(
-                *(
-                    derivative(history.signal, symbol).xreplace(late_values) * late.rate
-                    for symbol, late in own.items()
-                    if symbol in history.signal.free_symbols
-                )
-            )
+            rates = {symbol: late.rate for symbol, late in own.items()}
+            found[rate] = rate_along(history.signal, rates).xreplace(late_values)
         return found
 
     @cached_property
@@ -228,9 +215,9 @@ class KernelEquations:
         """Intermediate values computed before rates and outputs for sets side by side, as `Structure.steps`."""
         return dict(zip(self.frozen.steps, self._groups["live_steps"], strict=True))
 
-    def _put_back(self, array: str, limits: Mapping[int, sp.Expr]) -> tuple[list[str], list[sp.Expr]]:
+    def _put_back(self, limits: Mapping[int, sp.Expr]) -> tuple[list[str], list[sp.Expr]]:
         states = self.structure.states
-        return [f"{array}[{i}]" for i in limits], [limited(states[i], limit) for i, limit in limits.items()]
+        return [f"x[{i}]" for i in limits], [limited(states[i], limit) for i, limit in limits.items()]
 
     @cached_property
     def _names(self) -> dict[sp.Symbol, str]:
@@ -245,16 +232,11 @@ class KernelEquations:
             for i in range(self.structure.n_inputs)
             for symbol, array in zip(input_symbols(i), ("u", "du", "ddu"), strict=True)
         }
-        return {
-            **inputs,
-            TIME: "now->time",
-            **self._late_names,
-            **{
-                FrozenStructure.friction_sign(i): f"s[{own.mode}]"
-                for i, own in enumerate(self.frozen.frictions)
-            },
-            **{s: f"{array}[{i}]" for array, symbols in numbered.items() for i, s in enumerate(symbols)},
+        signs = {
+            FrozenStructure.friction_sign(i): f"s[{f.mode}]" for i, f in enumerate(self.frozen.frictions)
         }
+        names = inputs | {TIME: "now->time"} | self._late_names | signs
+        return names | {s: f"{array}[{i}]" for array, own in numbered.items() for i, s in enumerate(own)}
 
     @property
     def _late_names(self) -> dict[sp.Symbol, str]:
@@ -284,24 +266,18 @@ class KernelEquations:
     @property
     def reads_late(self) -> str:
         """A C array with, for each delayed signal, the flags of the delayed signals that it depends on."""
-        rows = [
-            ", ".join(str(int(other.symbol in own.signal.free_symbols)) for other in self._remembered)
+        read = [
+            [int(other.symbol in own.signal.free_symbols) for other in self._remembered]
             for own in self._remembered
         ]
-        return ", ".join(f"{{{row}}}" for row in rows)
+        return ", ".join(f"{{{_array(row)}}}" for row in read)
 
     def _slope(self, expression: sp.Expr) -> sp.Expr:
         """Return the total derivative of an expression with respect to time, between events."""
         along = {**dict(zip(self.structure.states, self._rate_symbols, strict=True)), TIME: sp.Integer(1)}
-        for i in range(self.structure.n_inputs):
-            value, rate, curvature = input_symbols(i)
-            along |= {value: rate, rate: curvature}
+        along |= input_rates(self.structure.n_inputs)
         along |= {h.symbol: rate for h, rate in zip(self.structure.histories, self._late_rates, strict=True)}
-        present = expression.free_symbols
-        return sum(
-            (derivative(expression, s) * rate for s, rate in along.items() if s in present),
-            start=sp.Integer(0),
-        )
+        return rate_along(expression, along)
 
     @property
     def friction_is_shown(self) -> bool:
@@ -320,12 +296,9 @@ class KernelEquations:
         # A state with a limited range enters the equations with its limited value. The state itself is integrated without the
         # limit within a substep and limited at its end, which is exact as long as its rate keeps its sign. The sign of a velocity
         # that dry friction can hold is an argument.
-        held = {
-            e.symbol: limited(e.symbol, e.limit)
-            for e in self.structure.remembering_equations
-            if e.limit is not None
-        }
-        return expression.xreplace({**self._friction_signs, **held})
+        equations = self.structure.remembering_equations
+        held = {e.symbol: limited(e.symbol, e.limit) for e in equations if e.limit is not None}
+        return expression.xreplace(self._friction_signs | held)
 
     @cached_property
     def _followed(self) -> dict[int, tuple[str, str]]:
@@ -341,3 +314,8 @@ class KernelEquations:
             for i, equation in enumerate(self.structure.remembering_equations)
             if equation.limit is not None and equation.rate in motions
         }
+
+
+def _array(numbers: Iterable[int], without: str = "0") -> str:
+    """Return the elements of an array in C, which has one at least."""
+    return ", ".join(map(str, numbers)) or without

@@ -115,9 +115,15 @@ class DefinedSignals:
         return symbol
 
     def changed(
-        self, kind: Kind, effect: Effect, expression: sp.Expr, signals: Mapping[str, sp.Expr]
+        self,
+        kind: Kind,
+        effect: Effect,
+        expression: sp.Expr,
+        signals: Mapping[str, sp.Expr],
+        states: list[FirstOrderState],
     ) -> sp.Symbol:
-        """Return a symbol for an expression in an effect's own symbols, see `Binder.effect`."""
+        """Return a symbol for an expression in an effect's own symbols, see `Binder.effect`; its states are appended."""
+        states += self.states(effect, signals)
         return self.define(kind, effect, self.binder.effect(effect, expression, signals))
 
     def states(self, effect: Effect, signals: Mapping[str, sp.Expr]) -> list[FirstOrderState]:

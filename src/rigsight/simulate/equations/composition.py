@@ -70,10 +70,9 @@ def structure_of_fit(structure: Structure, records: Iterable[Record]) -> Structu
 
     It is the same one if no record has any; those of sensors that the rig does not have are ignored.
     """
-    offsets, observed = set[str](), set[str]()
-    for record in records:
-        offsets.update(record.free_offsets)
-        observed.update(record.observed)
+    records = list(records)
+    offsets = {sensor for record in records for sensor in record.free_offsets}
+    observed = {sensor for record in records for sensor in record.observed}
     if not offsets and not observed:
         return structure
     return compose(structure.rig, structure.effects, dict(structure.fixed), offsets, observed)
@@ -91,9 +90,7 @@ def _compose(
     _check_effects(rig, effects)
     unique = unique_names(rig, effects)
     late = {rig.acts_at(effect) for effect in effects if effect.reading_delay is not None}
-    named = [
-        (bandwidth_name(sensor), f"bandwidth of the observer of {sensor}", "rad/s") for sensor in observed
-    ]
+    named = [(bandwidth_name(s), f"bandwidth of the observer of {s}", "rad/s") for s in observed]
     named += [(ahead_name(s), f"lead time of the reading of {s}", "s") for s in observed if s in late]
     of_observer = [Parameter(name, meaning, unit=unit, default=0.0) for name, meaning, unit in named]
     parameters = (*_parameters(rig, effects, unique, dict(fixed)), *of_observer)
@@ -154,9 +151,7 @@ def without_vanished_effects(
 
     def vanished(effect: Effect) -> bool:
         null = effect.null_values()
-        return bool(null) and all(
-            known.get(structure.parameter_name(effect, name)) == value for name, value in null.items()
-        )
+        return bool(null) and structure.values_of(effect, known).items() >= null.items()
 
     kept = [effect for effect in structure.effects if not vanished(effect)]
     if len(kept) == len(structure.effects):

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rigsight.effects.symbols import derivative, positive_part
@@ -27,26 +26,6 @@ at 1e-8."""
 _TINY = sp.Float(1e-300)
 """Added to a magnitude in a divisor or a logarithm: where the magnitude is zero, the finite result is multiplied by zero."""
 _MODULES: list[Any] = [{positive_part.__name__: lambda x: max(x, 0.0)}, "numpy"]
-
-
-@lru_cache(maxsize=128)
-def slope_functions(structure: Structure) -> SlopeFunctions:
-    """Return the derivatives of a structure's equations; repeated calls return the same object."""
-    return SlopeFunctions(structure)
-
-
-@dataclass(frozen=True, eq=False)
-class Slopes:
-    """Derivatives of the equations at one point."""
-
-    # Of the rates of the states, by states, shape (n_states, n_states), and by inputs and their first and
-    # second time derivatives, shape (3, n_states, n_inputs).
-    states: Floats
-    inputs: Floats
-    # Of the outputs, shapes (n_outputs, n_states) and (3, n_outputs, n_inputs).
-    outputs_by_states: Floats
-    outputs_by_inputs: Floats
-    rests: bool  # whether the point is an equilibrium
 
 
 @dataclass(frozen=True)
@@ -79,13 +58,11 @@ class SlopeFunctions:
             else _in_parts(structure, structure.elimination, arguments, by)
         )
 
+        # Indices of the states that are not velocities.
+        self._held = np.concatenate([np.arange(self._n), np.arange(2 * self._n, self._n_states)])
+
     def _place(self, state: Floats, inputs: Floats, p: Floats) -> list[float]:
         return [*state, *inputs, *np.zeros(2 * self._n_inputs), *p, 0.0]
-
-    @property
-    def _held(self) -> NDArray[np.intp]:
-        """Indices of the states that are not velocities."""
-        return np.concatenate([np.arange(self._n), np.arange(2 * self._n, self._n_states)])
 
     def resting(self, near: Floats, inputs: Floats, p: Floats) -> Floats:
         """Return the equilibrium under constant inputs, or the state closest to it, from a nearby state."""
@@ -104,18 +81,21 @@ class SlopeFunctions:
         def slopes(unknown: Floats) -> Floats:
             return self._motion.changes(*at(unknown))[:, held]
 
-        begin = state[held].copy()
+        end = begin = state[held].copy()
         with np.errstate(all="ignore"):
-            found = (
-                least_squares(balance, begin, jac=slopes, x_scale="jac")
-                if np.all(np.isfinite(balance(begin))) and np.all(np.isfinite(slopes(begin)))
-                else None
-            )
-        state[held] = begin if found is None or not found.success else found.x
+            if np.all(np.isfinite(balance(begin))) and np.all(np.isfinite(slopes(begin))):
+                found = least_squares(balance, begin, jac=slopes, x_scale="jac")
+                end = found.x if found.success else begin
+        state[held] = end
         return state
 
-    def at(self, state: Floats, inputs: Floats, p: Floats) -> Slopes:
-        """Return the derivatives at a state under constant inputs."""
+    def at(
+        self, state: Floats, inputs: Floats, p: Floats
+    ) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats], bool]:
+        """Return the derivatives of the rates and of the outputs under constant inputs, and whether this is an equilibrium.
+
+        Each by states, shape (n_rows, n_states), and by inputs and their first and second derivatives, (3, n_rows, n_inputs).
+        """
         n, n_states, n_inputs = self._n, self._n_states, self._n_inputs
         place = self._place(state, inputs, p)
         slopes = np.zeros((n_states, n_states + 3 * n_inputs))
@@ -132,25 +112,23 @@ class SlopeFunctions:
                 slopes[n : 2 * n] = np.linalg.solve(mass, by_place[:n] - turned)
         held = self._held
         near = np.abs(by_place[:, held]) @ (_NEAR * np.maximum(np.abs(state[held]), 1.0))
-        by_inputs = slopes[:, n_states:].reshape(n_states, 3, n_inputs)
-        outputs_by = outputs[:, n_states:].reshape(outputs.shape[0], 3, n_inputs)
-        return Slopes(
-            slopes[:, :n_states],
-            np.moveaxis(by_inputs, 1, 0),
-            outputs[:, :n_states],
-            np.moveaxis(outputs_by, 1, 0),
-            bool(np.all(np.abs(balance) <= near)),
-        )
+
+        def divided(rows: Floats) -> tuple[Floats, Floats]:
+            by_inputs = rows[:, n_states:].reshape(rows.shape[0], 3, n_inputs)
+            return rows[:, :n_states], np.moveaxis(by_inputs, 1, 0)
+
+        return divided(slopes), divided(outputs), bool(np.all(np.abs(balance) <= near))
+
+
+slope_functions = lru_cache(maxsize=128)(SlopeFunctions)
+"""The same of a structure, made once."""
 
 
 def declared_start(structure: Structure, p: Floats) -> Floats:
     """Return the start values declared in the rig file, shape (n_states,); zero for states without one."""
-    mechanism, values = structure.rig.mechanism, dict(zip(structure.names, p, strict=True))
-    found = np.zeros(len(structure.states))
-    for symbol, expression in mechanism.initial.items():
-        if symbol in structure.states:
-            found[structure.states.index(symbol)] = evaluated(expression, values)
-    return found
+    states, values = structure.states, dict(zip(structure.names, p, strict=True))
+    found = {s: evaluated(own, values) for s, own in structure.rig.mechanism.initial.items() if s in states}
+    return np.array([found.get(state, 0.0) for state in states])
 
 
 def _whole(structure: Structure, arguments: Sequence[sp.Symbol], by: Sequence[sp.Symbol]) -> _Motion:

@@ -122,7 +122,8 @@ def steps_to_accelerations(
     elimination: Elimination, masses: Sequence[sp.Expr], loads: Sequence[Sequence[sp.Expr]]
 ) -> dict[sp.Symbol, sp.Expr]:
     """Return all steps to the accelerations, from the expressions in the equations of motion."""
-    long = [term for terms in loads for term in terms if _is_long(term)]
+    every = [term for terms in loads for term in terms]
+    long = [term for term in every if any(True for _ in islice(sp.preorder_traversal(term), _SHORT, None))]
     shared = _shared(tuple(e for e in (*masses, *long) if not e.has(*_KINKS)))
     short = dict(zip(shared[0], shared[1].results, strict=True))
     return {
@@ -134,10 +135,6 @@ def steps_to_accelerations(
         },
         **elimination.steps,
     }
-
-
-def _is_long(term: sp.Expr) -> bool:
-    return any(True for _ in islice(sp.preorder_traversal(term), _SHORT, None))
 
 
 @lru_cache(maxsize=64)

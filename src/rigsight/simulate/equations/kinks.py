@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import sympy as sp
 
-from rigsight.effects.symbols import derivative, positive_part
+from rigsight.effects.symbols import derivative, positive_part, rate_along
 from rigsight.errors import InputError
 from rigsight.simulate.equations.elimination import Elimination
 from rigsight.simulate.equations.straight_line import straight_line
@@ -106,10 +106,8 @@ class FrozenStructure:
 def freeze(structure: Structure) -> FrozenStructure:
     """Replace every Abs, sign and positive part in a structure's equations by a mode symbol."""
     constant = set(structure.parameter_symbols)
-    expressions = [
-        *(state.limited_rate for state in structure.remembering_equations),
-        *structure.computed_outputs,
-    ]
+    expressions = [state.limited_rate for state in structure.remembering_equations]
+    expressions += structure.computed_outputs
     # A kink of a delayed signal is an event when it occurs, because its history then has a corner at that instant.
     expressions += [history.signal for history in structure.histories]
     expressions += structure.remembering_steps.values()
@@ -136,11 +134,7 @@ def freeze(structure: Structure) -> FrozenStructure:
             positive_part: sp.Mul(argument, 1 + signed, sp.Rational(1, 2)),
         }
         # The kink itself is named too: sympy may write the function of the same argument anew in another form.
-        replacement = {
-            **powers,
-            **{kind(argument): by for kind, by in smooth.items()},
-            kink: smooth[kink.func],
-        }
+        replacement = powers | {kind(argument): by for kind, by in smooth.items()} | {kink: smooth[kink.func]}
         replacements.append(replacement)
         expressions = [expression.xreplace(replacement) for expression in expressions]
     n_states, n_rates = len(structure.states), len(structure.states) + len(structure.computed_outputs)
@@ -182,9 +176,7 @@ def _frictions(
         # At rest, one velocity follows from the others.
         standstill = {moved[0]: moved[0] - switch / derivative(switch, moved[0])}
         if structure.elimination is None:
-            jump = sum(
-                (derivative(switch, v) * derivative(rates[v], mode) for v in moved), start=sp.Integer(0)
-            )
+            jump = rate_along(switch, {v: derivative(rates[v], mode) for v in moved})
             if is_zero(jump.subs(standstill)):
                 continue
             alone = not any(mode in rates[v].free_symbols for v in velocities if v != moved[0])

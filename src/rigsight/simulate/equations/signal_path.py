@@ -1,8 +1,8 @@
 """Insertion of effects into the equations of a rig: one pass along its places, which builds an `EquationTree`.
 
 At a drive: ``signal -> delays -> static effects and lags -> generalized force``. Its controller comes before that, or last where
-the law is the force (`rigsight.simulate.equations.controller_path`). At a joint: ``motion -> effects on deflection -> spring ->
-effects on its torque``, and other torques in parallel. At a sensor: ``reading -> effects -> delays``.
+the law is the force. At a joint: ``motion -> effects on deflection -> spring -> effects on its torque``, and other torques in
+parallel. At a sensor: ``reading -> effects -> delays``.
 """
 
 from __future__ import annotations
@@ -13,10 +13,9 @@ import sympy as sp
 
 from rigsight.effects import Effect, Energy, Place
 from rigsight.effects import symbols as canonical
-from rigsight.effects.symbols import derivative
-from rigsight.rigs import Drive, Joint, Rig, Sensor, force_symbol, reading_symbol
+from rigsight.effects.symbols import derivative, rate_along
+from rigsight.rigs import Controller, Drive, Joint, Rig, Sensor, force_symbol, reading_symbol
 from rigsight.simulate.equations.binder import Binder, DefinedSignals
-from rigsight.simulate.equations.controller_path import ControllerPath
 from rigsight.simulate.equations.structure import ahead_name, bandwidth_name, input_symbols
 from rigsight.simulate.equations.tree import (
     EquationsOfMotion,
@@ -31,6 +30,8 @@ from rigsight.simulate.equations.tree import (
     shifted,
 )
 from rigsight.units import at_place, size_of
+
+_OUTPUT = sp.Symbol("output of a controller", real=True)
 
 
 def equation_tree(
@@ -67,12 +68,9 @@ class _Path:
         bandwidths: Mapping[str, sp.Symbol] | None = None,
         ahead: Mapping[str, sp.Symbol] | None = None,
     ) -> None:
-        self._binder = binder
-        self._defined = DefinedSignals(binder, rig)
-        self._rig = rig
-        self._effects = effects
-        self._bandwidths = bandwidths or {}
-        self._ahead = ahead or {}
+        self._binder, self._defined = binder, DefinedSignals(binder, rig)
+        self._rig, self._effects = rig, effects
+        self._bandwidths, self._ahead = bandwidths or {}, ahead or {}
         self._shown: dict[str, tuple[sp.Expr, sp.Expr]] = {}
         """Reading of each sensor of the observer, and its delay."""
         self._offsets = {name: sp.Symbol(f"offset of {name}", real=True) for name in offsets}
@@ -88,11 +86,7 @@ class _Path:
         memories: list[FirstOrderState] = []
         readings: dict[str, tuple[sp.Expr, ...]] = {}
         of_joints = {force_symbol(joint.name) for joint in mechanism.joints}
-        last = [
-            name
-            for name in mechanism.order
-            if name in sensors and sensors[name].reads.free_symbols & of_joints
-        ]
+        last = [n for n in mechanism.order if n in sensors and sensors[n].reads.free_symbols & of_joints]
         for name in mechanism.order:
             if name in drives:
                 lags += self._drive(drives[name])
@@ -108,13 +102,8 @@ class _Path:
         if mechanism.free:
             pulled = self._observer(states) if self._bandwidths else None
             motion = equations_of_motion(self._rig, self._defined.bound, resisting, pulled)
-        return EquationTree(
-            inputs=self._inputs(),
-            definitions=definitions,
-            motion=motion,
-            states=states,
-            outputs=tuple(Output(sensor.name, readings[sensor.name]) for sensor in mechanism.sensors),
-        )
+        outputs = tuple(Output(sensor.name, readings[sensor.name]) for sensor in mechanism.sensors)
+        return EquationTree(self._inputs(), definitions, motion, states, outputs)
 
     def bound(self, expressions: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
         """Return expressions with drives and sensors replaced by their definitions, without forces of joints."""
@@ -130,11 +119,9 @@ class _Path:
         return tuple(map(self._defined.flattened, bound))
 
     def _inputs(self) -> tuple[sp.Symbol, ...]:
-        mechanism, found = self._rig.mechanism, []
-        prescribing = {coordinate.prescribed_by for coordinate in mechanism.prescribed}
+        mechanism, found = self._rig.mechanism, list[sp.Symbol]()
         for index, name in enumerate(mechanism.inputs):
-            value, rate, _ = input_symbols(index)
-            found += [value, rate] if name in prescribing else [value]
+            found += input_symbols(index)[: 2 if name in mechanism.prescribing else 1]
         for index in range(len(self._bandwidths)):
             found += input_symbols(len(mechanism.inputs) + index)
         return tuple(found)
@@ -148,11 +135,10 @@ class _Path:
         for place, (name, bandwidth) in enumerate(self._bandwidths.items(), len(mechanism.inputs)):
             reading, delay = self._shown[name]
             shown = self._defined.flattened(reading)
-            rate = sp.Add(*(derivative(shown, s) * rates[s] for s in rates if s in shown.free_symbols))
             found += observer_acceleration(
                 mechanism.free,
                 self._defined.bound(sensors[name].reads),
-                (reading, rate),
+                (reading, rate_along(shown, rates)),
                 measured_before(input_symbols(place), delay - self._ahead.get(name, sp.Integer(0))),
                 bandwidth,
             )
@@ -163,19 +149,54 @@ class _Path:
 
     def _drive(self, drive: Drive) -> list[FirstOrderState]:
         """Chain the effects of a drive and of its controller: the one that computes its signal acts before it."""
+        # In the controller: ``command -> delays -> filters -> law -> what is added to it -> limits``.
+        effects, own = self._at(drive.name, Place.CONTROLLER), sp.Symbol(drive.name, real=True)
+        law = self._rig.controllers[drive.name] if effects else None
+        states: list[FirstOrderState] = []
         lags: list[FirstOrderState] = []
-        changes = self._at(drive.name, Place.CONTROLLER)
-        if not changes:
-            source = self._sent(drive, self._defined.bound(drive.signal), lags)
-            self._defined.stands_for(sp.Symbol(drive.name, real=True), source)
-            return lags
-        law, n_inputs = self._rig.controllers[drive.name], len(self._rig.mechanism.inputs)
-        path = ControllerPath(self._binder, self._defined, n_inputs, drive, law, changes)
-        source = self._defined.bound(drive.signal) if law.in_force else path.signal()
+        if law is None or law.in_force:
+            source = self._defined.bound(drive.signal)
+        else:
+            _, output = self._controlled(law, effects, {}, states)
+            source = self._defined.bound(law.limited(_OUTPUT)).xreplace({_OUTPUT: output})
         source = self._sent(drive, source, lags)
-        source = path.goal_for(source) if law.in_force else source
-        self._defined.stands_for(sp.Symbol(drive.name, real=True), source)
-        return [*path.states, *lags]
+        if law is not None and law.in_force:
+            before, output = self._controlled(law, effects, {own: source}, states)
+            source = source + output - before
+        self._defined.stands_for(own, source)
+        return [*states, *lags]
+
+    def _controlled(
+        self,
+        law: Controller,
+        effects: Sequence[Effect],
+        own: Mapping[sp.Symbol, sp.Expr],
+        states: list[FirstOrderState],
+    ) -> tuple[sp.Expr, sp.Expr]:
+        """Return the output of a controller without and with its effects."""
+        parts = [self._defined.bound(part).xreplace(own) for part in (law.output, law.error, law.command)]
+        before = parts[0]
+        for effect in effects:
+            if effect.command_delay is not None:
+                delay = self._binder.effect(effect, effect.command_delay, {})
+                symbols = [input_symbols(i)[0] for i in range(len(self._rig.mechanism.inputs))]
+                read = [symbol for symbol in symbols if symbol in before.free_symbols]
+                arriving = {
+                    value: self._defined.define(Kind.DRIVE, effect, late(value, delay), of=" " * number)
+                    for number, value in enumerate(read)
+                }
+                parts = [part.xreplace(arriving) for part in parts]
+        output, error, command = parts
+        for effect in effects:
+            if effect.command is not None:
+                own_command = {"command": command}
+                followed = self._defined.changed(Kind.DRIVE, effect, effect.command, own_command, states)
+                output, error, command = output + followed - command, error + followed - command, followed
+        for effect in effects:
+            if effect.control is not None:
+                signals = {"output": output, "error": error, "command": command}
+                output = self._defined.changed(Kind.DRIVE, effect, effect.control, signals, states)
+        return before, output
 
     def _sent(self, drive: Drive, source: sp.Expr, lags: list[FirstOrderState]) -> sp.Expr:
         """Chain the actuator effects, delays first, because static effects and lags may as well act on the delayed signal."""
@@ -190,8 +211,7 @@ class _Path:
                 # The speed is that of the drive's own shaft, not of a joint.
                 speed = self._defined.bound(self._rig.mechanism.rate(drive.along))
                 signals = {**self._of_motion(), "u": source, "v": speed}
-                lags += self._defined.states(effect, signals)
-                source = self._defined.changed(Kind.DRIVE, effect, effect.drive, signals)
+                source = self._defined.changed(Kind.DRIVE, effect, effect.drive, signals, lags)
         return source
 
     def _joint(self, joint: Joint, memories: list[FirstOrderState]) -> tuple[sp.Expr, ...]:
@@ -199,10 +219,8 @@ class _Path:
         signals = self._signals(joint)
         effects = self._at(joint.name, Place.DYNAMICS, Place.DISTURBANCE)
         spring, squeezed = self._spring(effects, signals, memories)
-        static = self._defined.bound(
-            joint.force.xreplace({c.rate: sp.S.Zero for c in self._rig.mechanism.coordinates})
-        )
-        carried, torques = [spring, static], []
+        at_rest = {c.rate: sp.S.Zero for c in self._rig.mechanism.coordinates}
+        carried, torques = [spring, self._defined.bound(joint.force.xreplace(at_rest))], []
         # The load of a joint must be known before effects that depend on it.
         for effect in sorted(effects, key=lambda effect: effect.reads(canonical.load)):
             if effect.torque is None:
@@ -215,11 +233,10 @@ class _Path:
                     "load": self._defined.define(Kind.LOAD, effect, load),
                     "damped": self._defined.bound(joint.damping) * signals["v"],
                 }
-            torque = self._defined.changed(Kind.TORQUE, effect, effect.torque, signals)
+            torque = self._defined.changed(Kind.TORQUE, effect, effect.torque, signals, memories)
             if effect.energy is Energy.CONSERVATIVE:
                 carried.append(torque)
             torques.append(torque)
-            memories += self._defined.states(effect, signals)
         damped = squeezed if joint.damps_spring else signals["v"]
         damping, force = self._defined.bound(joint.damping) * damped, self._defined.bound(joint.force)
         return tuple(term for term in (damping, spring, *torques, force) if term != 0)
@@ -261,10 +278,8 @@ class _Path:
                 own = self._defined.states(effect, {**signals, "x": deflection, "v": rate})
                 before = sp.Symbol("deflection_before", real=True)
                 after = self._binder.effect(effect, effect.deflection, {**signals, "x": before})
-                rate = derivative(after, before).xreplace({before: deflection}) * rate + sum(
-                    (derivative(after, state.symbol) * state.limited_rate for state in own),
-                    start=sp.Integer(0),
-                )
+                rate = derivative(after, before).xreplace({before: deflection}) * rate
+                rate += rate_along(after, {state.symbol: state.limited_rate for state in own})
                 deflection = self._defined.define(
                     Kind.DEFLECTION, effect, after.xreplace({before: deflection})
                 )
@@ -279,8 +294,7 @@ class _Path:
                     "deflection": deflection,
                     "deflection_rate": rate,
                 }
-                torque = self._defined.changed(Kind.SPRING, effect, effect.spring, chained)
-                memories += self._defined.states(effect, chained)
+                torque = self._defined.changed(Kind.SPRING, effect, effect.spring, chained, memories)
         return torque, rate
 
     def _followers(self) -> list[FirstOrderState]:
@@ -288,11 +302,8 @@ class _Path:
         follower, found = self._rig.follower, []
         for state in self._rig.mechanism.states:
             if follower is None or state.symbol != follower.symbol:
-                found.append(
-                    FirstOrderState(
-                        state.symbol, (self._defined.bound(state.rate),), size_of(state.name), None, None
-                    )
-                )
+                rate = self._defined.bound(state.rate)
+                found.append(FirstOrderState(state.symbol, (rate,), size_of(state.name)))
                 continue
             signals = {
                 **self._of_motion(),
@@ -301,15 +312,11 @@ class _Path:
                 "lateral_displacement": self._defined.bound(follower.displacement),
                 "lateral_feedback": self._defined.bound(follower.feedback),
             }
-            linear = signals["creep_gain"] * signals["creepage"]
+            linear, changes = signals["creep_gain"] * signals["creepage"], []
             # Each effect defines the whole rate; of several effects, the differences from the linear rate are added.
-            changes = [
-                self._defined.define(
-                    Kind.LATERAL, effect, self._binder.effect(effect, effect.lateral, signals) - linear
-                )
-                for effect in self._effects
-                if effect.lateral is not None
-            ]
+            for effect in (e for e in self._effects if e.lateral is not None):
+                change = self._binder.effect(effect, effect.lateral, signals) - linear
+                changes.append(self._defined.define(Kind.LATERAL, effect, change))
             found.append(FirstOrderState(state.symbol, (linear, *changes), "length"))
         return found
 
@@ -328,8 +335,7 @@ class _Path:
         for effect in effects:
             if effect.measured is not None:
                 signals = {**self._of_motion(), "reading": reading}
-                states += self._defined.states(effect, signals)
-                reading = self._defined.changed(Kind.READING, effect, effect.measured, signals)
+                reading = self._defined.changed(Kind.READING, effect, effect.measured, signals, states)
         delays = [
             (effect, self._binder.effect(effect, effect.reading_delay, {}))
             for effect in effects

@@ -49,13 +49,10 @@ def needed_steps(
     expressions: Iterable[sp.Expr], steps: Mapping[sp.Symbol, sp.Expr]
 ) -> dict[sp.Symbol, sp.Expr]:
     """Return those of the steps that expressions need."""
-    waiting = [s for expression in expressions for s in expression.free_symbols if s in steps]
     found: set[sp.Symbol] = set()
-    while waiting:
-        symbol = waiting.pop()
-        if symbol not in found:
-            found.add(symbol)
-            waiting += [s for s in steps[symbol].free_symbols if s in steps]
+    while more := {s for expression in expressions for s in expression.free_symbols if s in steps} - found:
+        found |= more
+        expressions = [steps[symbol] for symbol in more]
     return {symbol: step for symbol, step in steps.items() if symbol in found}
 
 

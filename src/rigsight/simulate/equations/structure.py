@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import sympy as sp
 
 from rigsight.effects import Effect
-from rigsight.effects.symbols import derivative
+from rigsight.effects.symbols import rate_along
 from rigsight.parameters import Parameter
 from rigsight.rigs import Rig, joint_of
 from rigsight.simulate.equations.elimination import Elimination, steps_to_accelerations
@@ -30,6 +31,11 @@ def input_symbols(index: int) -> tuple[sp.Symbol, sp.Symbol, sp.Symbol]:
         sp.Symbol(f"{s.name} {index}", real=True) for s in (INPUT, INPUT_RATE, INPUT_CURVATURE)
     )
     return value, rate, curvature
+
+
+def input_rates(count: int) -> dict[sp.Symbol, sp.Symbol]:
+    """Return the inputs and their rates, each with its time derivative."""
+    return {symbol: rate for index in range(count) for symbol, rate in pairwise(input_symbols(index))}
 
 
 @dataclass(frozen=True)
@@ -156,18 +162,16 @@ class Structure:
     def histories(self) -> tuple[History, ...]:
         """Signals that are delayed within the rig and whose history is stored during the simulation."""
         tree = self.tree
-        late_signals = {
-            d.symbol: d.expression.args for d in tree.definitions if isinstance(d.expression, late)
-        }
+        delayed = {d.symbol: d.expression.args for d in tree.definitions if d.symbol in tree.remembered}
         return tuple(
-            History(symbol, tree.remembering(late_signals[symbol][0]), late_signals[symbol][1])
-            for symbol in tree.remembered
+            History(own, tree.remembering(delayed[own][0]), delayed[own][1]) for own in tree.remembered
         )
 
     @cached_property
     def shown_late(self) -> tuple[sp.Expr | None, ...]:
         """For each output the delay that is applied after the simulation, or None."""
-        return tuple(self.tree.shown_lateness(sp.Add(*output.terms)) for output in self.tree.outputs)
+        tree = self.tree
+        return tuple(tree.lateness(sp.Add(*output.terms), tree.remembered)[1] for output in tree.outputs)
 
     @property
     def is_shifted(self) -> bool:
@@ -178,14 +182,9 @@ class Structure:
     def delay(self) -> sp.Expr | None:
         """Delay of the only input, or None."""
         tree = self.tree
-        arriving = [
-            tree.lateness(d.symbol)[1]
-            for d in tree.definitions
-            if isinstance(d.expression, late)
-            and d.symbol not in tree.remembered
-            and tree.lateness(d.symbol)[0] == INPUT
-        ]
-        return arriving[-1] if arriving else None
+        delayed = (d.symbol for d in tree.definitions if isinstance(d.expression, late))
+        traced = (tree.lateness(symbol) for symbol in delayed if symbol not in tree.remembered)
+        return next(reversed([delay for root, delay in traced if root == INPUT]), None)
 
     @cached_property
     def late_inputs(self) -> tuple[LateInput, ...] | None:
@@ -209,18 +208,17 @@ class Structure:
     @cached_property
     def observed_delays(self) -> dict[str, sp.Expr]:
         """Delays of the sensors of an observer as expressions in parameters; sensors without a delay are left out."""
-        symbols = dict(zip(self.names, self.parameter_symbols, strict=True))
+        known: dict[str, sp.Expr] = {name: sp.Float(value) for name, value in self.fixed}
+        known |= zip(self.names, self.parameter_symbols, strict=True)
         found: dict[str, sp.Expr] = {}
         for effect in self.effects:
             sensor = self.rig.acts_at(effect)
             if effect.reading_delay is None or sensor not in self.observed:
                 continue
-            values = {}
-            for own in effect.parameters:
-                name = self.parameter_name(effect, own.name)
-                values[sp.Symbol(own.name, real=True)] = (
-                    symbols[name] if name in symbols else sp.Float(dict(self.fixed)[name])
-                )
+            names = {
+                sp.Symbol(p.name, real=True): self.parameter_name(effect, p.name) for p in effect.parameters
+            }
+            values = {own: known[name] for own, name in names.items()}
             found[sensor] = found.get(sensor, sp.Integer(0)) + effect.reading_delay.xreplace(values)
         return found
 
@@ -254,18 +252,9 @@ class Structure:
         if self.histories:
             shown = tuple(self.tree.remembering(sp.Add(*output.terms)) for output in self.tree.outputs)
         rates = {equation.symbol: equation.rate for equation in self.remembering_equations}
-        for index in range(self.n_inputs):
-            value, rate, curvature = input_symbols(index)
-            rates |= {value: rate, rate: curvature}
-        slopes = [
-            sum(
-                (derivative(reading, s) * rates[s] for s in rates if s in reading.free_symbols),
-                start=sp.Integer(0),
-            )
-            for reading, delay in zip(shown, self.shown_late, strict=True)
-            if delay is not None
-        ]
-        return (*shown, *slopes)
+        rates |= input_rates(self.n_inputs)
+        late_ones = (s for s, delay in zip(shown, self.shown_late, strict=True) if delay is not None)
+        return (*shown, *(rate_along(reading, rates) for reading in late_ones))
 
     @cached_property
     def accelerating_inputs(self) -> frozenset[int]:
@@ -301,6 +290,11 @@ class Structure:
     def parameter_name(self, effect: Effect, own_name: str) -> str:
         """Return the name that a parameter of one of the effects has in this structure."""
         return unique_names(self.rig, self.effects)[effect.name, own_name]
+
+    def of_rig(self, expression: sp.Expr) -> sp.Expr:
+        """Return an expression of the rig's constants and parameters in the symbols of this structure."""
+        own = dict(zip(self.names, self.parameter_symbols, strict=True))
+        return expression.xreplace({s: own[s.name] for s in expression.free_symbols})
 
     @property
     def special_cases(self) -> frozenset[tuple[str, str]]:
@@ -357,13 +351,9 @@ def special_values(
     names = unique_names(rig, (*effects, *beside))
     released = set()
     if like is not None:
-        fixed = dict(like.fixed)
         released = {
-            (effect.name, own)
-            for effect in like.effects
-            for own in effect.special_cases
-            if like.parameter_name(effect, own) not in fixed
-        }
+            (effect.name, own) for effect in like.effects for own in effect.special_cases
+        } - like.special_cases
     return {
         names[effect.name, own]: value
         for effect in effects

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import sympy as sp
 
-from rigsight.effects.symbols import derivative, positive_part
+from rigsight.effects.symbols import derivative, positive_part, rate_along
 from rigsight.rigs import Coordinate, Rig, applied_symbol, has_short_inverse
 from rigsight.simulate.equations.elimination import acceleration_symbols
 from rigsight.units import size_of
@@ -203,12 +203,9 @@ class EquationTree:
         rates = dict(zip(motion.coordinates, motion.velocities, strict=True))
         rates |= zip(motion.velocities, motion.accelerations, strict=True)
         rates |= {state.symbol: state.rate for state in self.states}
-        present = [s for s in rates if s in flat.free_symbols]
-        return sum((derivative(flat, s) * self.flattened(rates[s]) for s in present), start=sp.Integer(0))
-
-    def shown_lateness(self, symbol: sp.Symbol) -> sp.Expr | None:
-        """Return the delay of a reading that is applied after the simulation; None if there is none."""
-        return self.lateness(symbol, self.remembered)[1]
+        return rate_along(
+            flat, {s: self.flattened(rate) for s, rate in rates.items() if s in flat.free_symbols}
+        )
 
     def lateness(self, symbol: sp.Symbol, kept: Sequence[sp.Symbol] = ()) -> tuple[sp.Symbol, sp.Expr | None]:
         """Return the symbol or expression before all delays but those `kept`, and the total delay; None without a delay."""
@@ -223,19 +220,20 @@ class EquationTree:
         return {definition.symbol: definition.expression for definition in self.definitions}
 
     @cached_property
-    def _remembering_values(self) -> Mapping[sp.Symbol, sp.Expr]:
-        return self._values_without(self.remembered)
-
-    @cached_property
     def _values(self) -> Mapping[sp.Symbol, sp.Expr]:
         return self._values_without(())
+
+    @cached_property
+    def _remembering_values(self) -> Mapping[sp.Symbol, sp.Expr]:
+        return self._values_without(self.remembered)
 
     def _values_without(self, kept: Sequence[sp.Symbol]) -> Mapping[sp.Symbol, sp.Expr]:
         values: dict[sp.Symbol, sp.Expr] = {}
         for symbol, expression in self._expressions.items():
             if symbol not in kept:
-                now = expression.args[0] if isinstance(expression, late) else expression
-                values[symbol] = now.xreplace(values)
+                values[symbol] = (
+                    expression.args[0] if isinstance(expression, late) else expression
+                ).xreplace(values)
         return values
 
 

@@ -13,6 +13,7 @@ from sympy.printing.octave import OctaveCodePrinter
 from sympy.printing.pycode import PythonCodePrinter
 
 from rigsight.simulate.equations.straight_line import StraightLine, needed_steps, straight_line
+from rigsight.simulators import simulated_slope
 
 _NO_STEPS: Mapping[sp.Symbol, sp.Expr] = {}
 
@@ -110,6 +111,12 @@ def _plain(expression: sp.Expr) -> sp.Expr:
     return expression.evalf() if expression.is_number else expression
 
 
+def _asked(leaf: sp.Function) -> tuple[str, Sequence[sp.Expr]]:
+    """Return which value another simulator is asked for, or by which argument its slope, and the arguments."""
+    count = 2 if isinstance(leaf, simulated_slope) else 1
+    return ", ".join(str(int(number)) for number in leaf.args[1 : 1 + count]), leaf.args[1 + count :]
+
+
 def _called(function: str, *further: str) -> Callable[[Any, sp.Function], str]:
     """Return the method of a printer that writes a function as a call of another one."""
     return lambda printer, expr: f"{function}({', '.join([*map(printer._print, expr.args), *further])})"
@@ -196,13 +203,12 @@ class CPrinter(PowersAsProducts, C99CodePrinter):  # type: ignore[misc]
     _print_positive_part, _print_limited = _called("positive"), _called("within")
 
     def _print_simulated(self, expr: sp.Function) -> str:
-        _, index, *arguments = expr.args
-        return f"simulated(0, {int(index)}, (const double[]){{{', '.join(map(self._print, arguments))}}})"
+        numbers, arguments = _asked(expr)
+        listed = ", ".join(map(self._print, arguments))
+        return f"{type(expr).__name__}(0, {numbers}, (const double[]){{{listed}}})"
 
     def _print_simulated_slope(self, expr: sp.Function) -> str:
-        _, index, by, *arguments = expr.args
-        listed = ", ".join(map(self._print, arguments))
-        return f"simulated_slope(0, {int(index)}, {int(by)}, (const double[]){{{listed}}})"
+        return self._print_simulated(expr)
 
 
 class LanePrinter(CPrinter):
@@ -246,14 +252,9 @@ class LanePrinter(CPrinter):
         return self._call("pow", expr.base, expr.exp)
 
     def _print_simulated(self, expr: sp.Function) -> str:
-        _, index, *arguments = expr.args
+        numbers, arguments = _asked(expr)
         listed = ", ".join(map(self._vector, arguments))
-        return f"v_simulated({int(index)}, {len(arguments)}, (const lanes[]){{{listed}}})"
-
-    def _print_simulated_slope(self, expr: sp.Function) -> str:
-        _, index, by, *arguments = expr.args
-        listed = ", ".join(map(self._vector, arguments))
-        return f"v_simulated_slope({int(index)}, {int(by)}, {len(arguments)}, (const lanes[]){{{listed}}})"
+        return f"v_{type(expr).__name__}({numbers}, {len(arguments)}, (const lanes[]){{{listed}}})"
 
 
 C = Language(CPrinter(), "const double {} = {};", "{} = {};")

@@ -127,11 +127,10 @@ def shown_names(structure: Structure, label: Callable[[str], str] = in_words) ->
 def _input_names(rig: Rig, forms: Mapping[str, ShownName]) -> dict[sp.Symbol, ShownName]:
     """Return the names of the inputs, and of the rates of those that prescribe a motion."""
     names = {}
-    prescribing = {coordinate.prescribed_by for coordinate in rig.mechanism.prescribed}
     for index, source in enumerate(rig.mechanism.inputs):
         value, rate, curvature = input_symbols(index)
         names[value] = forms[source]
-        if source in prescribing:
+        if source in rig.mechanism.prescribing:
             names |= {rate: names[value].dotted(), curvature: names[value].dotted().dotted()}
     return names
 

@@ -15,12 +15,11 @@ from sympy.printing.str import StrPrinter
 from rigsight.simulate.printing.names import GREEK, ShownName, named
 from rigsight.simulate.printing.shown import ReadingOrder, ShownEquation
 
-_TEXT_JOINED = {"": "", "+": " + ", "-": " - "}
+_JOINED = {"": "", "+": " + ", "-": " - "}
 _TEXT_WITHIN = " within |%s| <= %s"
 
 _DIGITS = 6
 """Significant digits of numbers in an effect's equation; values of parameters are given separately."""
-_LATEX_JOINED = {"": "", "+": " + ", "-": " - "}
 _LATEX_WITHIN = r",\quad \left|%s\right| \leq %s"
 _ACCENTS = ("", r"\dot", r"\ddot")
 
@@ -58,13 +57,6 @@ class EquationPrinter(ReadingOrder, TextPrinter):
         return f"{self._print(signal)}(t - {self.parenthesize(delay, PRECEDENCE['Mul'])})"
 
 
-class TermPrinter(EquationPrinter):
-    """A single term in a short form, without spaces in powers."""
-
-    def _print_Pow(self, expr: sp.Expr, rational: bool = False) -> str:  # noqa: N802
-        return super()._print_Pow(expr, rational=rational).replace(" ", "")
-
-
 def text(expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> str:
     """Return an expression as plain text with its symbols renamed."""
     symbols = {s: sp.Symbol(name, real=True) for s, name in names.items()}
@@ -79,13 +71,13 @@ def text_equation(equation: ShownEquation, names: Mapping[sp.Symbol, str]) -> st
     def expression(shown: sp.Expr) -> str:
         return str(printer.doprint(shown.xreplace(symbols)))
 
-    left, right = equation.written(expression, _TEXT_JOINED, _TEXT_WITHIN)
+    left, right = equation.written(expression, _JOINED, _TEXT_WITHIN)
     return f"{left} = {right}".replace("=  - ", "= -")
 
 
 def latex_equation(equation: ShownEquation, names: Mapping[sp.Symbol, ShownName]) -> tuple[str, str]:
     """Return both sides of an equation as LaTeX for math mode."""
-    left, right = equation.written(LatexPrinter(names).expression, _LATEX_JOINED, _LATEX_WITHIN)
+    left, right = equation.written(LatexPrinter(names).expression, _JOINED, _LATEX_WITHIN)
     return left, right.strip()
 
 

@@ -53,6 +53,16 @@ class ShownEquation:
             return (("", self.terms[0]),)
         return _signed(part for term in self.terms for part in sp.Add.make_args(term))
 
+    def mapped(self, change: Callable[[sp.Expr], sp.Expr]) -> ShownEquation:
+        """Return the equation with changed expressions."""
+        return replace(
+            self,
+            left=change(self.left),
+            terms=tuple(map(change, self.terms)),
+            limit=None if self.limit is None else (self.limit[0], change(self.limit[1])),
+            inertia=tuple((change(mass), rate) for mass, rate in self.inertia),
+        )
+
     def written(
         self, expression: Callable[[sp.Expr], str], joined: Mapping[str, str], within: str
     ) -> tuple[str, str]:
@@ -106,7 +116,8 @@ def shown_equations(structure: Structure, label: Callable[[str], str] = in_words
     ]
     motion = _motion(structure) if structure.elimination is None else _motion_in_parts(structure)
     every = [*motion, *effects, *_states(structure), *_outputs(structure, names)]
-    every = [replace(e, terms=tuple(map(with_limits, e.terms))) for e in map(_by_name, every)]
+    every = [e.mapped(_by_name) for e in every]
+    every = [replace(e, terms=tuple(map(with_limits, e.terms))) for e in every]
     owners = dict.fromkeys([None, *(equation.owner for equation in every)])
     return ShownEquations(names, tuple(e for owner in owners for e in every if e.owner == owner))
 
@@ -126,33 +137,17 @@ def flat_equations(structure: Structure, numbers: Mapping[sp.Symbol, sp.Expr]) -
     def flat(expression: sp.Expr) -> sp.Expr:
         return expression.xreplace(values).xreplace(numbers)
 
-    every = [*map(_by_name, _motion(structure)), *_states(structure), *_outputs(structure, names)]
-    flattened = (
-        replace(
-            equation,
-            left=flat(equation.left),
-            inertia=tuple((flat(mass), rate) for mass, rate in equation.inertia),
-            terms=tuple(term for term in map(flat, equation.terms) if term != 0) or (sp.Integer(0),),
-            limit=None if equation.limit is None else (equation.limit[0], flat(equation.limit[1])),
-        )
-        for equation in every
-    )
-    return ShownEquations(names, tuple(flattened))
+    motion = (equation.mapped(_by_name) for equation in _motion(structure))
+    every = [own.mapped(flat) for own in (*motion, *_states(structure), *_outputs(structure, names))]
+    present = ([term for term in equation.terms if term != 0] for equation in every)
+    shown = (replace(e, terms=tuple(terms) or (sp.S.Zero,)) for e, terms in zip(every, present, strict=True))
+    return ShownEquations(names, tuple(shown))
 
 
-def _by_name(equation: ShownEquation) -> ShownEquation:
-    """Return an equation with names for quantities from another simulator, because their formulas are unknown."""
-
-    def named(expression: sp.Expr) -> sp.Expr:
-        leaves = expression.atoms(simulated)
-        return expression.xreplace({leaf: simulated_symbol(place_of(leaf)) for leaf in leaves})
-
-    return replace(
-        equation,
-        left=named(equation.left),
-        terms=tuple(map(named, equation.terms)),
-        inertia=tuple((named(mass), rate) for mass, rate in equation.inertia),
-    )
+def _by_name(expression: sp.Expr) -> sp.Expr:
+    """Return an expression with names for quantities from another simulator, because their formulas are unknown."""
+    leaves = expression.atoms(simulated)
+    return expression.xreplace({leaf: simulated_symbol(place_of(leaf)) for leaf in leaves})
 
 
 def _motion(structure: Structure) -> list[ShownEquation]:
@@ -183,15 +178,12 @@ def _motion_in_parts(structure: Structure) -> list[ShownEquation]:
 
 def _states(structure: Structure) -> list[ShownEquation]:
     kinematic = kinematic_states(structure)
+    shown = [state for state in structure.tree.states if state.symbol not in kinematic]
+    rates = [rate_symbol(kinematic.get(state.symbol, state.symbol)) for state in shown]
+    limits = [None if state.limit is None else (state.symbol, state.limit) for state in shown]
     return [
-        ShownEquation(
-            state.owner,
-            rate_symbol(kinematic.get(state.symbol, state.symbol)),
-            state.terms,
-            None if state.limit is None else (state.symbol, state.limit),
-        )
-        for state in structure.tree.states
-        if state.symbol not in kinematic
+        ShownEquation(s.owner, rate, s.terms, limit)
+        for s, rate, limit in zip(shown, rates, limits, strict=True)
     ]
 
 

@@ -12,7 +12,7 @@ from rigsight.effects import Effect
 from rigsight.errors import check_in_range
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
-from rigsight.simulate.compiled.kernel import compile_kernels, compiled
+from rigsight.simulate.compiled.kernel import compiled, kernel_of
 from rigsight.workflow.run.progress import Listener, Stage, silent
 
 COMPILING = "Compiling kernels (first time only)"
@@ -51,5 +51,5 @@ def prepare_kernels(structures: Sequence[Structure], n_jobs: int, listener: List
 
 
 def _compile(structure: Structure) -> str:
-    compile_kernels(structure)
+    kernel_of(structure)
     return ", ".join(structure.effect_names) or structure.rig.name
