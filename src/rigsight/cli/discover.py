@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -41,7 +42,8 @@ def discover(
 ) -> None:
     """Find the equations of motion from the records, by sparse regression and free-run simulation.
 
-    Writes discovery.json, model.json and discovery.svg into DIR; all files or none.
+    Writes discovery.json, model.json and discovery.svg into DIR; all files or none. Laws that no catalogue has are written as
+    effects for --effects: discovered.py has the powers of the equation, shape.py the shape of what it lacks.
     """
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.discover import run_discover
@@ -62,7 +64,12 @@ def discover(
     if json:
         show_json(out / "discovery.json")
     elif not quiet:
+        from rigsight.discover.result import LAWS_FILE, SHAPE_FILE
         from rigsight.report.terminal import discovery_summary
 
         show(discovery_summary(found))
         show_files({"Results": out / "discovery.json", "Model": out / "model.json"})
+        written = {LAWS_FILE: found.own_laws, SHAPE_FILE: found.offered}
+        for file in (out / name for name, law in written.items() if law):
+            for command in ("discover", "diagnose"):
+                typer.echo(shlex.join(["rigsight", command, str(campaign), "--effects", str(file)]))
