@@ -44,9 +44,9 @@ CUBIC = known_terms()["cubic_stiffness"]
 @pytest.fixture(scope="module")
 def cubic() -> tuple[Bench, AlongMotion, Trial]:
     """Return the records of a spring that saturates, with the equation of a cubic spring for it."""
-    t, rng, records = 5e-3 * np.arange(1600), np.random.default_rng(1), []
+    t, rng, records = 5e-3 * np.arange(700), np.random.default_rng(1), []
     for amplitude, role in ((1.0, "estimation"), (4.0, "estimation"), (2.5, "validation")):
-        drawn = Record(role, 5e-3, {"u": linear_sweep(t, amplitude, 2.0, 60.0)}, {}, hold="foh", role=role)
+        drawn = Record(role, 5e-3, {"u": linear_sweep(t, amplitude, 2.0, 40.0)}, {}, hold="foh", role=role)
         run = simulate(compose(AXIS, [SATURATING]), AXIS_VALUES, drawn)
         records.append(run.with_signals(x=run["x"] + rng.normal(scale=NOISE, size=t.size)))
     along = AlongMotion.of(Campaign("axis", AXIS, {"gain": 1.0}, {}, tuple(records)), AXIS_VALUES, [CUBIC])

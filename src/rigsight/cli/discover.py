@@ -46,11 +46,12 @@ def discover(
     effects for --effects: discovered.py has the powers of the equation, shape.py the shape of what it lacks.
     """
     with report_errors(debug), listening(quiet) as listener:
-        from rigsight.workflow.discover import run_discover
+        from rigsight.workflow.discover import check_kept, run_discover
         from rigsight.workflow.own.own_effects import own_effects
         from rigsight.workflow.own.own_rigs import own_rigs, own_simulators
 
         own_simulators(simulator or [])
+        check_kept(effects or [], out)
         found = run_discover(
             campaign,
             out,

@@ -172,7 +172,7 @@ class OfferedShape:
         better = self.error_over_noise < self.error_before
         return (
             f"A function of the {self.argument} alone at {self.force.joint} explains {100.0 * self.share:.4g} % of the square of "
-            f"what is missing there on the held-out records ({self.n_knots} knots). With it"
+            f"what is missing there on the held-out records ({self.n_knots} knot{'s' if self.n_knots > 1 else ''}). With it"
             f"{f' in place of {others}' if others else ''} free runs leave {self.error_over_noise:.3g} noise floors, without it "
             f"{self.error_before:.3g}{'' if better else ': they do not prefer it'}. {SHAPE_FILE} declares it: {_use(SHAPE_FILE)}"
         )

@@ -27,6 +27,7 @@ from rigsight.inverse.equation_fit import per_force
 from rigsight.inverse.joint_force import joint_motion
 from rigsight.inverse.measured_motion import WIDER
 from rigsight.inverse.regression import Regression
+from rigsight.inverse.selection import WORTH
 from rigsight.inverse.term import compiled
 from rigsight.parameters import Parameter
 from rigsight.records import Record
@@ -152,18 +153,18 @@ def shapes(along: AlongMotion, fit: FitResult, held_out: Sequence[Record]) -> li
     except SimulationError:
         return []
     equation = _Equation.along_records(along, fit, (along.terms_of, unseen))
-    lowest, found = equation.cost(*equation.rows((), along.rig.mechanism.joints[0], "velocity")) - STRONG, []
+    seen, held = equation.rows((), along.rig.mechanism.joints[0], "velocity")
+    lowest, enough = equation.cost(seen, held) - STRONG, (1.0 - WORTH) * held.left((), seen.fitted(()))
+    found = list[Shape]()
     for joint, argument in itertools.product(along.rig.mechanism.joints, _SIGNALS):
         there = equation.laws_at(joint, argument)
         seen, held = equation.rows(there, joint, argument)
         supports = sorted(seen.supports(), key=lambda own: (len(own), equation.cost(seen, held, own)))
         costs = [equation.cost(seen, held, own) for own in supports]
-        if min(costs) < lowest:
+        lasting = [own for i, own in enumerate(supports) if costs[i] < min(costs[:i], default=math.inf)]
+        if min(costs) < lowest and held.left(lasting[-1], seen.fitted(lasting[-1])) < enough:
             lowest = min(costs)
-            best = [
-                own for i, own in enumerate(supports) if costs[i] < min(costs[:i], default=math.inf) and own
-            ]
-            found = [equation.shape(joint, argument, there, own, seen, held) for own in best]
+            found = [equation.shape(joint, argument, there, own, seen, held) for own in lasting if own]
     return found
 
 
@@ -237,7 +238,7 @@ class _Equation:
 def started(parameter: Parameter, number: float) -> Parameter:
     """Return a parameter whose fits start at a number, in characteristic units, and search from zero to beyond it."""
     start = _short(number)
-    low, high = sorted((0.0, _FURTHEST * start))
+    low, high = sorted((0.0, _short(_FURTHEST * start)))
     return replace(parameter, starts=(start,), search=(low, high))
 
 

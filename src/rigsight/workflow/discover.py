@@ -14,7 +14,7 @@ from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.discover import Discovery, DiscoveryData, discover
 from rigsight.discover.result import LAWS_FILE, SHAPE_FILE
 from rigsight.effects import Effect
-from rigsight.errors import RigsightError
+from rigsight.errors import InputError, RigsightError
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.fit.windows import cut, window_length
 from rigsight.plot import svg_text
@@ -27,7 +27,7 @@ from rigsight.workflow.own.effect_checks import failed_checks
 from rigsight.workflow.own.effect_file import effect_file
 from rigsight.workflow.run.kernels import checked_jobs
 from rigsight.workflow.run.progress import Listener, Stage, report_notes, silent
-from rigsight.workflow.run.results import check_writable, json_text, write_together
+from rigsight.workflow.run.results import ELSEWHERE, check_writable, json_text, write_together
 
 DISCOVERY_FILE = "discovery.json"
 FIGURE_FILE = "discovery.svg"
@@ -62,6 +62,15 @@ def run_discover(
     if out is not None:
         write_discovery(found, Path(out))
     return found
+
+
+def check_kept(files: Iterable[Path], out: Path) -> None:
+    """Check that no file with effects of the user would be replaced by one that is written."""
+    for name in (LAWS_FILE, SHAPE_FILE):
+        if any(file.resolve() == (out / name).resolve() for file in files):
+            raise InputError(
+                f"{out / name} is read for its effects, and a discovery into {out} may replace it. {ELSEWHERE}"
+            )
 
 
 def discover_campaign(

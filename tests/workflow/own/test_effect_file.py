@@ -36,8 +36,8 @@ def powers(**values: float) -> tuple[str, Effect]:
 
 
 LAWS = {
-    "spring that saturates": shape("displacement", (2, 5, 7, 9, 11), (0.0054, 0.051, 0.168, 0.129, -0.028)),
-    "friction in one direction": shape("velocity", (0, 14, 26), (0.2, 0.1, -0.05)),
+    "spring that saturates": shape("displacement", (5, 7, 11), (0.051, 0.168, -0.028)),
+    "friction in one direction": shape("velocity", (4, 20), (0.2, -0.1)),
     "motor constant by position": powers(b_10=-8.0, b_20=32.0),
     "damping by position": powers(c_11=20.0, c_03=2.0),
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping
 from dataclasses import fields
@@ -36,7 +37,7 @@ def _fragments(force: str, effect: Effect) -> dict[str, str]:
     return {
         "CONSTANT": effect.name.upper(),
         "NAME": effect.name,
-        "SUMMARY": effect.summary,
+        "SUMMARY": _literal(effect.summary),
         "PARAMETERS": "\n".join(f"        {_declared(p)}," for p in effect.parameters),
         "ENERGY": effect.energy.name,
         "TREND": effect.signature.gain_trend.name,
@@ -49,5 +50,9 @@ def _declared(parameter: Parameter) -> str:
     """Return the call that makes a parameter; what is as usual is left out."""
     usual = Parameter(parameter.name, parameter.description)
     given = {field.name: getattr(parameter, field.name) for field in fields(parameter)}
-    said = [f"{name}={value!r}" for name, value in given.items() if value != getattr(usual, name)]
-    return f"Parameter({', '.join([repr(parameter.name), repr(parameter.description), *said])})"
+    said = [f"{name}={_literal(value)}" for name, value in given.items() if value != getattr(usual, name)]
+    return f"Parameter({', '.join([_literal(parameter.name), _literal(parameter.description), *said])})"
+
+
+def _literal(value: object) -> str:
+    return json.dumps(value) if isinstance(value, str) else repr(value)
