@@ -161,10 +161,11 @@ def shapes(along: AlongMotion, fit: FitResult, held_out: Sequence[Record]) -> li
         seen, held = equation.rows(there, joint, argument)
         supports = sorted(seen.supports(), key=lambda own: (len(own), equation.cost(seen, held, own)))
         costs = [equation.cost(seen, held, own) for own in supports]
-        lasting = [own for i, own in enumerate(supports) if costs[i] < min(costs[:i], default=math.inf)]
-        if min(costs) < lowest and held.left(lasting[-1], seen.fitted(lasting[-1])) < enough:
+        if min(costs) < lowest:
             lowest = min(costs)
-            found = [equation.shape(joint, argument, there, own, seen, held) for own in lasting if own]
+            lasting = [own for i, own in enumerate(supports) if costs[i] < min(costs[:i], default=math.inf)]
+            clear = [own for own in lasting if own and held.left(own, seen.fitted(own)) < enough]
+            found = [equation.shape(joint, argument, there, own, seen, held) for own in clear]
     return found
 
 
