@@ -103,6 +103,44 @@ def test_an_equation_that_holds_is_offered_no_shape(cubic: tuple[Bench, AlongMot
     assert offered_shape(right, along, trial, lambda _: None) is None
 
 
+@pytest.mark.slow
+def test_the_shape_is_found_at_its_joint(drive_train: Rig) -> None:
+    train = {
+        "k_t": 0.05,
+        "J_m": 1e-4,
+        "J_l": 5e-4,
+        "k_s": 2.0,
+        "d_s": 1e-3,
+        "d_m": 1e-3,
+        "d_l": 1e-3,
+        "k_l": 0.5,
+    }
+    law = placed(replace(SATURATING, torque=0.02 * sp.tanh(x / 0.01)), "shaft")
+    t, rng, runs = 5e-3 * np.arange(800), np.random.default_rng(0), []
+    for i, (amplitude, role) in enumerate(((0.8, "estimation"), (1.5, "estimation"), (1.1, "validation"))):
+        u = amplitude * np.sin(i + 2.0 * np.pi * (0.5 * t + (0.8 if i < 2 else 0.5) * t**2))
+        drawn = Record(f"run {i}", 5e-3, {"u": u}, {}, hold="foh", role=role)
+        runs.append(simulate(compose(drive_train, [law]), train, drawn, accuracy=1e-6))
+    noise = {s.name: 1e-3 * float(np.std(runs[0][s.name])) for s in drive_train.outputs}
+    records = [
+        r.with_signals(**{n: r[n] + rng.normal(scale=std, size=t.size) for n, std in noise.items()})
+        for r in runs
+    ]
+    along = AlongMotion.of(Campaign("train", drive_train, {"k_t": 0.05}, {}, tuple(records)), train, [
+        placed(CUBIC, "load_bearing")
+    ])  # fmt: skip
+    assert along is not None
+    bench = Bench(
+        rig=drive_train, estimation=tuple(records[:2]), held_out=tuple(records[2:]), values=train, noise=noise,
+        scales=characteristic_scales(drive_train, records[:2], train), held=frozenset({"k_t"}),
+    )  # fmt: skip
+    (linear,) = bench.trials_of([Attempt(frozenset(), [train])])
+    offered = offered_shape(bench, along, linear, lambda _: None)
+    assert offered is not None
+    assert (offered.force.joint, offered.argument) == ("shaft", "displacement")
+    assert offered.error_over_noise < 0.2 * offered.error_before
+
+
 def test_powers_of_an_equation_are_one_candidate_at_each_joint(drive_train: Rig) -> None:
     known = known_terms()
     names = [

@@ -14,7 +14,6 @@ from rigsight.discover.bench import Bench, Trial
 from rigsight.discover.own_laws import own_laws
 from rigsight.discover.records import DiscoveryData, strength
 from rigsight.discover.result import (
-    SHAPE_FILE,
     Alternative,
     Coefficient,
     Discovery,
@@ -184,7 +183,7 @@ def _still_missing(stages: Found) -> list[str]:
         outside += (
             "it is no clear function of one argument. A law read from it can be offered with --effects."
             if stages.offered is None
-            else f"{SHAPE_FILE} declares a law of its shape."
+            else f"a function of the {stages.offered.argument} alone explains more of it than these equations."
         )
     return [
         f"The equations leave {error:.1f} times the noise floor in free run on the held-out records. {outside} Standard errors "
