@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,16 +14,23 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.cli import app
-from rigsight.discover import MONOMIALS, DiscoveryData
+from rigsight.discover import MONOMIALS, Discovery, DiscoveryData, JointForce
+from rigsight.discover.own_laws import own_laws
+from rigsight.discover.result import OfferedShape, Run
+from rigsight.discover.shape import Shape
 from rigsight.effects import effect_named
+from rigsight.errors import InputError
 from rigsight.identify.fit.windows import cut
+from rigsight.inverse import MissingForce
 from rigsight.records import Record
 from rigsight.records.record import Role
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose
+from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import read_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.discover import discover_campaign, only, run_discover
+from rigsight.workflow.discover import check_kept, discover_campaign, only, run_discover, write_discovery
+from rigsight.workflow.own.own_effects import own_effects
 from rigsight.workflow.run.progress import Step
 from rigsight.workflow.simulate import run_simulate
 
@@ -45,12 +53,45 @@ def test_a_discovery_is_written_whole_and_its_model_simulates(axis_campaign: Pat
     assert "k_{3}" in written["latex"][0]
     assert steps[-1].done <= steps[-1].total
 
+    assert written["offered_shape"] is None
+    assert written["own_laws"] is None
+
     campaign = read_campaign(axis_campaign)
     validation = campaign.validation[0]
     assert validation.source is not None
     simulated = run_simulate(out, validation.source, tmp_path / "predicted.csv")
     error = validation["x"] - simulated["x"]
     assert np.sqrt(np.mean(error**2)) < 3.0 * found.noise_floor * np.std(validation["x"])
+
+
+def test_laws_that_no_catalogue_has_are_written_as_effects(tmp_path: Path) -> None:
+    (joint,) = AXIS.mechanism.joints
+    shape = Shape(joint, "velocity", 0.1, ("coulomb_friction",), (3, 7), (0.2, 0.1), 0.9)
+    structure = compose(AXIS, [MONOMIALS[0]])
+    model = Model.of(structure, dict.fromkeys(structure.names, 1.0), "foh")
+    laws = own_laws(model, (), {"x": 0.1, "force": 1.0, "time": 0.1})
+    nothing = np.zeros(40)
+    missing = MissingForce("dynamics", "m", "N", 0.0, 1.0, ("a",) * 40, *(3 * [nothing + 1.0]), nothing)
+    offered = OfferedShape(
+        effect=shape.effect, equation=shape.equation, argument="velocity", in_place_of=shape.in_place_of,
+        n_knots=2, share=0.9, error_before=9.0, error_over_noise=2.0,
+        force=JointForce(missing, nothing, (shape.effect.name,)),
+    )  # fmt: skip
+    run = Run("a", "validation", 0.1 * np.arange(40), nothing, nothing, "x", "m")
+    found = Discovery(
+        title="", rig="axis", equations=(), latex=(), rig_parameters={}, terms=(), alternatives=(), held_out=(),
+        held_out_error=9.0, held_out_nrmse=0.1, noise_floor=0.01, independent=9.0, runs=(run,), output="x", unit="m",
+        model={}, warnings=(), offered=offered, own_laws=laws,
+    )  # fmt: skip
+    write_discovery(found, tmp_path)
+    written = json.loads((tmp_path / "discovery.json").read_text())
+    for entry, expected in (("offered_shape", [shape.effect]), ("own_laws", list(laws))):
+        file = tmp_path / written[entry]["file"]
+        assert own_effects([file], check=False) == tuple(expected)
+        with pytest.raises(InputError, match=re.escape(str(file))):
+            check_kept([file], tmp_path)
+    check_kept([tmp_path / "shape.py"], tmp_path / "again")
+    assert written["offered_shape"]["error_in_noise_floors"] == {"before": 9.0, "with_it": 2.0}
 
 
 @pytest.mark.slow

@@ -323,7 +323,7 @@ class IdentificationResult(Result, Identification):
 
 
 class DiscoveryResult(Result, Discovery):
-    """The result of a discovery, as it is in ``discovery.json``; saved with ``model.json`` and ``discovery.svg``."""
+    """The result of a discovery, as it is in ``discovery.json``; saved with ``model.json``, ``discovery.svg``, own effects."""
 
     def __repr__(self) -> str:
         return f"DiscoveryResult({self.title!r}, equations={self.equations!r})"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -117,12 +118,15 @@ def discover(
 ) -> None:
     """Find the equations of motion from the records, by sparse regression and free-run simulation.
 
-    Writes discovery.json, model.json and discovery.svg into DIR; all files or none.
+    Writes discovery.json, model.json and discovery.svg into DIR; all files or none. Laws that no catalogue has are written as
+    effects for --effects: discovered.py has the powers of the equation, shape.py the shape of what it lacks.
     """
     with output.reporting() as listener:
+        from rigsight.discover.result import LAWS_FILE, SHAPE_FILE
         from rigsight.report.terminal import discovery_summary
-        from rigsight.workflow.discover import run_discover
+        from rigsight.workflow.discover import check_kept, run_discover
 
+        check_kept(own.effects or [], out)
         read = own.read(listener)
         found = run_discover(
             campaign,
@@ -136,6 +140,12 @@ def discover(
         )
     files = {"Results": out / "discovery.json", "Model": out / "model.json"}
     output.show(out / "discovery.json", lambda: discovery_summary(found), files)
+    if output.json or output.quiet:
+        return
+    written = {LAWS_FILE: found.own_laws, SHAPE_FILE: found.offered}
+    for file in (out / name for name, law in written.items() if law):
+        for command in ("discover", "diagnose"):
+            typer.echo(shlex.join(["rigsight", command, str(campaign), "--effects", str(file)]))
 
 
 @with_groups

@@ -24,8 +24,9 @@ from rigsight.inverse.measured_motion import WIDER
 from rigsight.inverse.selection import Selection
 from rigsight.inverse.term import Term
 from rigsight.records.record import Floats
-from rigsight.rigs import Rig
+from rigsight.rigs import Joint, Rig
 from rigsight.simulate import Structure
+from rigsight.units import at_place, characteristic_value
 
 _PLACES, _FORMS = 3, 3
 """Families at places that are tried beside an equation, and forms of each: the fits decide between forms that are alike here."""
@@ -96,7 +97,7 @@ class AlongMotion:
     """
 
     def __init__(self, terms_of: EffectTerms, selection: Selection, modelled: Sequence[Effect]) -> None:
-        self._terms_of, self._selection, self._modelled = terms_of, selection, modelled
+        self.terms_of, self._selection, self._modelled = terms_of, selection, modelled
         self._rig = terms_of.fit.rig
 
     @classmethod
@@ -109,7 +110,7 @@ class AlongMotion:
     @property
     def numbers(self) -> Values:
         """Numbers of the rig with which its equations alone leave least."""
-        return self._terms_of.values
+        return self.terms_of.values
 
     def at_once(self) -> Iterator[Proposed]:
         """Yield what the regression alone selects: two terms, three, and so on."""
@@ -137,9 +138,15 @@ class AlongMotion:
 
     def instead(self, fit: FitResult, left_out: Effect, other: Effect) -> Proposed | None:
         """Return an equation with another effect in place of one of its own; None where it cannot be a term."""
-        chosen = self._of_equation(fit, left_out)
+        chosen = self._of_equation(fit, {left_out.name})
         best = self._best_of_each(chosen, {other.name})
         return self._proposed(chosen, best[0][1]) if best else None
+
+    def with_law(self, fit: FitResult, law: Effect, in_place_of: Collection[str]) -> Proposed:
+        """Return an equation with a law that no term is yet, in place of some of its own; it is linear in all that is fitted."""
+        chosen = self._of_equation(fit, in_place_of)
+        wider = _Chosen(chosen.selection.with_terms(list(self.terms_of.of(law))), chosen.terms)
+        return self._proposed(wider, len(chosen.selection.terms))
 
     def inclusion(self, fit: FitResult, rng: np.random.Generator) -> dict[str, float]:
         """Return how often sparse regression selects each term of an equation, and the best others that are not its rivals."""
@@ -173,8 +180,8 @@ class AlongMotion:
 
     def missing(self, fit: FitResult, joint: str) -> tuple[MissingForce, Floats]:
         """Return the force at a joint beside the terms that an equation has elsewhere, and its law there, shape (n_rows,)."""
-        structure, motions = fit.structure, self._terms_of.fit.motions
-        values = {**self._terms_of.values, **dict(structure.fixed), **fit.values}
+        structure, motions = fit.structure, self.terms_of.fit.motions
+        values = {**self.terms_of.values, **dict(structure.fixed), **fit.values}
         forces = [effect for effect in structure.effects if is_joint_force(effect)]
         here = [effect for effect in forces if self._rig.acts_at(effect) == joint]
         elsewhere = [effect for effect in forces if effect not in here]
@@ -193,14 +200,36 @@ class AlongMotion:
         """The rig of the equations."""
         return self._rig
 
-    def _of_equation(self, fit: FitResult, left_out: Effect | None = None) -> _Chosen:
-        """Return the terms of an equation at its fitted numbers; what has no column along the motion is left out."""
+    def is_modelled(self, effect: Effect) -> bool:
+        """Return True for an effect of the given simulation."""
+        return effect in self._modelled
+
+    def is_at(self, effect: Effect, joint: Joint) -> bool:
+        """Return True for a term of an equation that acts at a joint."""
+        return not self.is_modelled(effect) and self._rig.acts_at(effect) == joint.name
+
+    def size(self, dimension: str, joint: Joint) -> float:
+        """Return the size that a quantity of a dimension has at a joint."""
+        own = dimension if self._rig.has_one_motion else at_place(dimension, joint.name)
+        return characteristic_value(own, self.terms_of.scales)
+
+    def of_equation(
+        self, fit: FitResult, left_out: Collection[str], terms_of: EffectTerms | None = None
+    ) -> list[Term]:
+        """Return the terms of an equation at its fitted numbers, along these motions or others.
+
+        Those named, and what has no column along the motion, are left out.
+        """
         numbers = {**dict(fit.structure.fixed), **fit.values}
         terms: list[Term] = []
         for effect in fit.structure.effects:
-            if effect is not left_out and effect not in self._modelled:
+            if effect.name not in left_out and not self.is_modelled(effect):
                 own = fit.structure.values_of(effect, numbers)
-                terms += list(self._terms_of.at(effect, own))[:1]
+                terms += list((terms_of or self.terms_of).at(effect, own))[:1]
+        return terms
+
+    def _of_equation(self, fit: FitResult, left_out: Collection[str] = ()) -> _Chosen:
+        terms = self.of_equation(fit, left_out)
         first = len(self._selection.terms)
         return _Chosen(self._selection.with_terms(terms), tuple(range(first, first + len(terms))))
 
@@ -259,7 +288,7 @@ class AlongMotion:
             for i in chosen.terms
         }
         numbers = selection.numbers_beside(1.0, {}).values(chosen.columns)
-        return Regressed(own, {**self._terms_of.values, **numbers})
+        return Regressed(own, {**self.terms_of.values, **numbers})
 
 
 def _differ(first: Values, second: Values) -> bool:

@@ -11,8 +11,18 @@ import sympy as sp
 
 from rigsight.discover.along_motion import AlongMotion
 from rigsight.discover.bench import Bench, Trial
+from rigsight.discover.own_laws import own_laws
 from rigsight.discover.records import DiscoveryData, strength
-from rigsight.discover.result import Alternative, Coefficient, Discovery, HeldOut, JointForce, Run, Term
+from rigsight.discover.result import (
+    Alternative,
+    Coefficient,
+    Discovery,
+    HeldOut,
+    JointForce,
+    OfferedShape,
+    Run,
+    Term,
+)
 from rigsight.discover.selection import STRONG, Selection, criterion
 from rigsight.discover.terms import POWERS
 from rigsight.effects import Effect
@@ -95,6 +105,7 @@ class Found:
     along: AlongMotion | None
     inclusion: Mapping[str, float]
     held: str
+    offered: OfferedShape | None
 
 
 def doubts(effect: Effect, own: Mapping[str, Coefficient]) -> str:
@@ -162,12 +173,18 @@ def _still_missing(stages: Found) -> list[str]:
     error = stages.judged.error_over_noise
     if error <= BY_NOISE:
         return []
-    outside = (
-        "No further term lowers it: what is missing is outside the library, or disturbances are larger than the noise floor. The "
-        "figure shows the force missing at each joint over its motion; a law read from it can be offered with --effects."
-        if stages.along is not None
-        else "An effect is still missing, or disturbances are larger than the noise floor."
-    )
+    if stages.along is None:
+        outside = "An effect is still missing, or disturbances are larger than the noise floor."
+    else:
+        outside = (
+            "No further term lowers it: what is missing is outside the library, or disturbances are larger than the noise floor. "
+            "The figure shows the force missing at each joint over its motion; "
+        )
+        outside += (
+            "it is no clear function of one argument. A law read from it can be offered with --effects."
+            if stages.offered is None
+            else f"a function of the {stages.offered.argument} alone explains more of it than these equations."
+        )
     return [
         f"The equations leave {error:.1f} times the noise floor in free run on the held-out records. {outside} Standard errors "
         "count what scatters, not what is missing: they are too small here."
@@ -233,6 +250,7 @@ def assembled(data: DiscoveryData, found: Found) -> Discovery:
     text, latex = equations(final.structure, held_numbers(final))
     own = {p.name for p in rig.parameters}
     runs = _runs(data, found)
+    model = Model.of(final.structure, final.values, found.estimation[0].hold)
     return Discovery(
         title=data.campaign.title,
         rig=rig.name,
@@ -249,9 +267,11 @@ def assembled(data: DiscoveryData, found: Found) -> Discovery:
         runs=runs,
         output=rig.outputs[0].name,
         unit=rig.outputs[0].unit,
-        model=Model.of(final.structure, final.values, found.estimation[0].hold).to_json(),
+        model=model.to_json(),
         warnings=warnings_of(data, found, terms, floor),
         joints=_joints(found),
+        offered=found.offered,
+        own_laws=own_laws(model, found.bench.modelled, found.bench.scales),
     )
 
 
@@ -272,7 +292,7 @@ def _joints(found: Found) -> tuple[JointForce, ...]:
     joints = []
     for joint in along.rig.mechanism.joints:
         missing, law = along.missing(found.final, joint.name)
-        here = (e for e in effects if e not in found.bench.modelled and along.rig.acts_at(e) == joint.name)
+        here = (e for e in effects if along.is_at(e, joint))
         joints.append(JointForce(missing, law, tuple(kind_of(effect.name) for effect in here)))
     return tuple(sorted(joints, key=lambda own: (not own.terms, -own.missing.share)))
 

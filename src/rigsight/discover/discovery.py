@@ -11,6 +11,7 @@ import numpy as np
 from rigsight.discover.along_motion import AlongMotion
 from rigsight.discover.assembly import BY_NOISE, Found, assembled
 from rigsight.discover.bench import Attempt, Bench, Trial
+from rigsight.discover.own_laws import offered_shape
 from rigsight.discover.records import DiscoveryData, split
 from rigsight.discover.result import Discovery
 from rigsight.discover.selection import select
@@ -94,9 +95,11 @@ def discover(
     say("polished")
     inclusion = {} if along is None else along.inclusion(final, np.random.default_rng(seed))
     say("ensembles")
-    return assembled(
-        data, Found(estimation, held_out, how, bench, selection, judged, final, along, inclusion, held)
-    )
+    shape = None
+    if along is not None and judged.error_over_noise > BY_NOISE:
+        shape = offered_shape(bench, along, chosen, say)
+    found = Found(estimation, held_out, how, bench, selection, judged, final, along, inclusion, held, shape)
+    return assembled(data, found)
 
 
 def _check_predicts(judged: Trial, bench: Bench) -> None:

@@ -9,12 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from rigsight.effects import Effect
 from rigsight.inverse import MissingForce
 from rigsight.json_data import json_data
 from rigsight.records import Record
 from rigsight.records.record import Floats
 
 SCHEMA_VERSION = 2
+SHAPE_FILE, LAWS_FILE = "shape.py", "discovered.py"
+"""Effects of one's own that are written beside ``discovery.json``: an offered shape, and the powers of the equation."""
 
 
 @dataclass(frozen=True)
@@ -148,6 +151,49 @@ class JointForce:
 
 
 @dataclass(frozen=True, eq=False)
+class OfferedShape:
+    """A law of one argument that explains clearly more of the missing force than the equation: an effect for `--effects`."""
+
+    effect: Effect  # a sum of sigmoids, without a place
+    equation: str  # its force as Python text
+    argument: str  # displacement or velocity
+    in_place_of: tuple[str, ...]  # laws of the same argument that the equation has at this joint
+    n_knots: int
+    share: float  # of the square of the missing force along the held-out motion that it explains
+    # Held-out error of the equation in noise floors, before and with it.
+    error_before: float
+    error_over_noise: float
+    force: JointForce  # the missing force at its joint beside the fit with it
+
+    @property
+    def sentence(self) -> str:
+        """The offer in words."""
+        others = ", ".join(name.replace("_", " ") for name in self.in_place_of)
+        better = self.error_over_noise < self.error_before
+        return (
+            f"A function of the {self.argument} alone at {self.force.joint} explains {100.0 * self.share:.4g} % of the square of "
+            f"what is missing there on the held-out records ({self.n_knots} knot{'s' if self.n_knots > 1 else ''}). With it"
+            f"{f' in place of {others}' if others else ''} free runs leave {self.error_over_noise:.3g} noise floors, without it "
+            f"{self.error_before:.3g}{'' if better else ': they do not prefer it'}. {SHAPE_FILE} declares it: {_use(SHAPE_FILE)}"
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the entry of ``discovery.json``."""
+        return {
+            "file": SHAPE_FILE,
+            "effect": self.effect.name,
+            "equation": self.equation,
+            "where": self.force.joint,
+            "argument": self.argument,
+            "in_place_of": self.in_place_of,
+            "n_knots": self.n_knots,
+            "share_of_force": self.share,
+            "error_in_noise_floors": {"before": self.error_before, "with_it": self.error_over_noise},
+            "sentence": self.sentence,
+        }
+
+
+@dataclass(frozen=True, eq=False)
 class Discovery:
     """The result of a discovery.
 
@@ -181,6 +227,10 @@ class Discovery:
         Warnings before the equations are used, one sentence each.
     joints
         Missing force per joint, those with terms first; empty where the sensors do not show the motion.
+    offered
+        Shape of what the equation lacks; None if nothing clear is missing, or it is no function of one argument.
+    own_laws
+        Powers of the equation, which name no cause, as effects for a diagnosis.
     by_record
         Result for each record alone, or the reason why there is none; empty unless requested.
     given
@@ -207,9 +257,20 @@ class Discovery:
     model: Mapping[str, Any]
     warnings: tuple[str, ...]
     joints: tuple[JointForce, ...] = ()
+    offered: OfferedShape | None = None
+    own_laws: tuple[Effect, ...] = ()
     by_record: tuple[tuple[str, Discovery | str], ...] = ()
     given: Mapping[str, float] = field(default_factory=dict)
     records: tuple[Record, ...] = ()
+
+    @property
+    def laws_sentence(self) -> str:
+        """What can be done with the powers of the equation, in words; empty if there are none."""
+        if not self.own_laws:
+            return ""
+        return (
+            f"{LAWS_FILE} declares the powers of the equation as candidates of a diagnosis: {_use(LAWS_FILE)}"
+        )
 
     @property
     def kept(self) -> tuple[Term, ...]:
@@ -244,9 +305,21 @@ class Discovery:
                 for r in self.records
             ],
             "joints": [joint.to_json() for joint in self.joints],
+            "offered_shape": None if self.offered is None else self.offered.to_json(),
+            "own_laws": {
+                "file": LAWS_FILE,
+                "effects": {law.name: str(law.torque) for law in self.own_laws},
+                "sentence": self.laws_sentence,
+            }
+            if self.own_laws
+            else None,
             "by_record": {
                 name: {"error": found} if isinstance(found, str) else found.to_json()
                 for name, found in self.by_record
             },
         }
         return json_data(content)
+
+
+def _use(file: str) -> str:
+    return f"'rigsight diagnose CAMPAIGN --effects {file}', and likewise 'rigsight discover'."

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rigsight.discover.along_motion import AlongMotion, Proposed
 from rigsight.discover.bench import HOPELESS, Attempt, Bench, Support, Trial
 from rigsight.discover.stability import information_criterion
+from rigsight.effects import Effect
 from rigsight.errors import SimulationError
 from rigsight.records.record import Floats
 from rigsight.simulate import carried_over
@@ -126,6 +127,20 @@ def select(
     for trial in sorted(pool, key=lambda t: criterion(t, independent)):
         by_support.setdefault(trial.support, trial)
     return Selection(best, tuple(by_support.values()), independent)
+
+
+def best_with_law(
+    bench: Bench,
+    along: AlongMotion,
+    equation: Trial,
+    laws: Sequence[tuple[Effect, Sequence[str]]],
+    progress: Callable[[str], None],
+) -> Trial:
+    """Return the best of the equations with one further law each, in place of the terms that are named beside it."""
+    offered = {**bench.effects, **{law.name: law for law, _ in laws}}
+    search = _Search(replace(bench, effects=offered), along, progress)
+    longer = [search.attempt(along.with_law(equation.fit, law, others), equation) for law, others in laws]
+    return _fewest(search.bench, search.tried(longer))
 
 
 @dataclass(frozen=True, eq=False)

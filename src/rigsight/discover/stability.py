@@ -61,6 +61,11 @@ def inclusion_probabilities(
     return np.asarray(counts / _N_ENSEMBLE)
 
 
+def supports_by_size(terms: Floats, target: Floats) -> list[Support]:
+    """Return the supports that remain when the least useful of terms is dropped again and again, the smallest first."""
+    return _path(*_compressed(terms, target))
+
+
 def information_criterion(mean_square: float, n_terms: int, independent: float) -> float:
     """Return the Bayesian information criterion with the number of independent residuals."""
     return float(independent * np.log(mean_square + 1e-300) + n_terms * np.log(independent))

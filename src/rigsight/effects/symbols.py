@@ -1,4 +1,4 @@
-"""The symbols every effect's equation is written in, and the piecewise functions they share.
+"""The symbols every effect's equation is written in, and the functions they share.
 
 All kinks are written through ``Abs``, ``sign`` and `positive_part`: the simulation finds these atoms, freezes their sign between
 events and so keeps its full order across them.
@@ -10,6 +10,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import sympy as sp
+
+_LEVELS_OFF = sp.Rational(1, 2)
+"""Width over which a sigmoid levels off, in units of its knot."""
 
 x = sp.Symbol("x", real=True)
 """Displacement from the rest position (psi - psi_off on the running gear)."""
@@ -134,3 +137,26 @@ def beyond(expression: sp.Expr, half_width: sp.Expr) -> sp.Expr:
 def clamp(expression: sp.Expr, half_width: sp.Expr) -> sp.Expr:
     """Return `expression` limited to [-half_width, half_width]; exact for any half width, however large."""
     return expression - beyond(expression, half_width)
+
+
+def sigmoid(signal: sp.Expr, knot: sp.Expr | float, side: int = 0) -> sp.Expr:
+    """Return a smooth function of `signal` that grows by one up to a knot and stays there; zero at zero.
+
+    Parameters
+    ----------
+    signal
+        For instance `x` or `v`.
+    knot
+        Where the growth ends, positive.
+    side
+        0: on both sides of zero, with the sign of the signal; 1 or -1: mainly where the signal has this sign.
+    """
+    width = _LEVELS_OFF * knot
+
+    def distance(place: sp.Expr | float) -> sp.Expr:
+        return sp.sqrt((signal - place) ** 2 + width**2)
+
+    if side == 0:
+        return (distance(-knot) - distance(knot)) / (2 * knot)
+    at_rest = width - knot * sp.sqrt(1 + _LEVELS_OFF**2)
+    return side * (distance(0) - distance(side * knot) - at_rest) / (2 * knot)

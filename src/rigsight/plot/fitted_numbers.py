@@ -180,7 +180,9 @@ def discovery_figure(found: Discovery) -> Figure:
     terms = [term for term in found.terms if math.isfinite(term.otherwise)][:_MOST_TERMS]
     runs = found.runs[:_MOST_RUNS]
     numbers = _numbers(found)
-    joints = found.joints[:_MOST_JOINTS]
+    joints = [(joint, "") for joint in found.joints[:_MOST_JOINTS]]
+    if found.offered is not None:
+        joints.append((found.offered.force, f", fitted with {found.offered.effect.name}"))
     top = 0.9 + 0.28 * max(len(terms), len(numbers), 3)
     heights = [top, 2.5 * len(runs), *(2.3 for _ in joints)]
     figure = new_figure(8.4, sum(heights))
@@ -191,12 +193,12 @@ def discovery_figure(found: Discovery) -> Figure:
     axes = parts[1].subplots(2 * len(runs), 1, squeeze=False, height_ratios=[3, 1.3] * len(runs))[:, 0]
     for index, run in enumerate(runs):
         _draw_run(axes[2 * index], axes[2 * index + 1], run)
-    for part, joint in zip(parts[2:], joints, strict=True):
-        _draw_joint(part.subplots(1, 2, sharey=True), joint)
+    for part, (joint, fitted) in zip(parts[2:], joints, strict=True):
+        _draw_joint(part.subplots(1, 2, sharey=True), joint, _spoken(fitted))
     return figure
 
 
-def _draw_joint(axes: Sequence[Axes], joint: JointForce) -> None:
+def _draw_joint(axes: Sequence[Axes], joint: JointForce, fitted: str) -> None:
     """Draw the missing force of a joint over its displacement and its velocity, with the identified law."""
     missing = joint.missing
     some = slice(None, None, max(1, missing.force.size // _POINTS))
@@ -217,7 +219,7 @@ def _draw_joint(axes: Sequence[Axes], joint: JointForce) -> None:
     axes[0].set_ylabel(f"force [{unit}]")
     axes[0].legend(loc="upper left", fontsize=8, markerscale=6.0)
     explained = f": the law explains {joint.share_of_force:.0%}" if joint.terms else ""
-    axes[0].set_title(f"Missing at {_spoken(joint.joint)}{explained}")
+    axes[0].set_title(f"Missing at {_spoken(joint.joint)}{fitted}{explained}")
 
 
 def _draw_terms(ax: Axes, terms: Sequence[Term], error: float) -> None:

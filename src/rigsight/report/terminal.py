@@ -161,6 +161,10 @@ def discovery_rows(found: Discovery) -> Iterator[tuple[str, str]]:
         yield f"{term.name} at {term.where}" if term.where else term.name, _term(term)
     for joint in found.joints:
         yield f"missing at {joint.joint}", joint.sentence
+    if found.offered is not None:
+        yield "outside the library", found.offered.sentence
+    if found.own_laws:
+        yield "in no catalogue", found.laws_sentence
     for own in found.held_out:
         yield f"{own.record}, held out", f"{gap_percent(own.nrmse)}, {own.error_over_noise:.3g} x floor"
     for rival in found.alternatives[:_RANKED]:

@@ -1,4 +1,4 @@
-"""The work of `rigsight discover`: a campaign -> `discovery.json`, `model.json` and a figure."""
+"""The work of `rigsight discover`: a campaign -> `discovery.json`, `model.json`, a figure, and effects for `--effects`."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from threadpoolctl import threadpool_limits
 from rigsight.campaign import Campaign
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.discover import Discovery, DiscoveryData, discover
+from rigsight.discover.result import LAWS_FILE, SHAPE_FILE
 from rigsight.effects import Effect
-from rigsight.errors import RigsightError
+from rigsight.errors import InputError, RigsightError
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.fit.windows import cut, window_length
 from rigsight.plot import svg_text
@@ -22,9 +23,11 @@ from rigsight.records import Record
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.own.effect_checks import failed_checks
+from rigsight.workflow.own.effect_file import effect_file
 from rigsight.workflow.run.kernels import checked_jobs
 from rigsight.workflow.run.progress import Listener, Stage, report_notes, silent
-from rigsight.workflow.run.results import check_writable, json_text, write_together
+from rigsight.workflow.run.results import ELSEWHERE, check_writable, json_text, write_together
 
 DISCOVERY_FILE = "discovery.json"
 FIGURE_FILE = "discovery.svg"
@@ -61,6 +64,15 @@ def run_discover(
     return found
 
 
+def check_kept(files: Iterable[Path], out: Path) -> None:
+    """Check that no file with effects of the user would be replaced by one that is written."""
+    for name in (LAWS_FILE, SHAPE_FILE):
+        if any(file.resolve() == (out / name).resolve() for file in files):
+            raise InputError(
+                f"{out / name} is read for its effects, and a discovery into {out} may replace it. {ELSEWHERE}"
+            )
+
+
 def discover_campaign(
     campaign: Campaign,
     *,
@@ -76,7 +88,7 @@ def discover_campaign(
     stage = Stage(DISCOVERING, _STEPS, listener)
     # Supports are fitted in parallel; multithreaded matrix products would only compete for the same processors.
     with threadpool_limits(limits=1, user_api="blas"):
-        found = discover(data, effects, seed, stage.finished, n_jobs)
+        found = _with_usable_laws(discover(data, effects, seed, stage.finished, n_jobs))
         notes = (*campaign.notes, *(note for record in campaign.records for note in record.notes))
         notes += tuple(closed_loop_notes(campaign.records, campaign.rig, "It is not used in a discovery."))
         factor = campaign.open_factor
@@ -91,6 +103,19 @@ def discover_campaign(
             return found
         alone = _one_by_one(campaign, data, effects, seed, n_jobs, stage.finished)
         return replace(found, by_record=alone)
+
+
+def _with_usable_laws(found: Discovery) -> Discovery:
+    """Return a discovery whose own effects pass the checks that they meet when a file with them is read."""
+    offered = () if found.offered is None else (found.offered.effect,)
+    failed = {law.name: failed_checks(law) for law in (*found.own_laws, *offered)}
+    notes = [f"{name} is not written as an effect: {own[0]}" for name, own in failed.items() if own]
+    return replace(
+        found,
+        own_laws=tuple(law for law in found.own_laws if not failed[law.name]),
+        offered=None if any(failed[law.name] for law in offered) else found.offered,
+        warnings=(*found.warnings, *notes),
+    )
 
 
 def discovery_data(campaign: Campaign) -> DiscoveryData:
@@ -111,14 +136,18 @@ def only(data: DiscoveryData, record: Record) -> DiscoveryData:
 
 def write_discovery(found: Discovery, out: Path) -> tuple[Path, ...]:
     """Write all results of a discovery into a folder, all or none."""
-    return write_together(
-        out,
-        {
-            DISCOVERY_FILE: json_text(found.to_json()),
-            MODEL_FILE: json_text(found.model),
-            FIGURE_FILE: svg_text(discovery_figure(found), FIGURE_FILE),
-        },
-    )
+    files = {
+        DISCOVERY_FILE: json_text(found.to_json()),
+        MODEL_FILE: json_text(found.model),
+        FIGURE_FILE: svg_text(discovery_figure(found), FIGURE_FILE),
+    }
+    if found.own_laws:
+        about = f"Powers of the equation that 'rigsight discover' found for {found.rig}."
+        files[LAWS_FILE] = effect_file(about, {str(law.torque): law for law in found.own_laws})
+    if found.offered is not None:
+        about = f"The shape of a force that the equation of {found.rig} lacks."
+        files[SHAPE_FILE] = effect_file(about, {found.offered.equation: found.offered.effect})
+    return write_together(out, files)
 
 
 def _one_by_one(
@@ -133,7 +162,10 @@ def _one_by_one(
 
     def alone(record: Record) -> tuple[str, Discovery | str]:
         try:
-            return record.name, discover(only(data, record), effects, seed)
+            # Effects are handed on from all records together.
+            return record.name, replace(
+                discover(only(data, record), effects, seed), offered=None, own_laws=()
+            )
         except RigsightError as error:
             return record.name, str(error)
 

@@ -13,6 +13,7 @@ from rigsight.diagnose.pushes.probes import (
     signal_columns,
     with_probes,
 )
+from rigsight.discover import known_terms
 from rigsight.effects import effect_named, placed
 from rigsight.records.record import Record
 from rigsight.rigs import RIGS
@@ -88,6 +89,15 @@ def test_an_effect_by_itself_is_its_law() -> None:
     structure, column = alone(placed(effect_named("input_saturation"), "motor"))
     out = simulate(structure, {"u_max": 0.1}, Record("reported", DT, {"signal": x}, {}))
     np.testing.assert_allclose(out[structure.rig.outputs[column].name], np.clip(x, -0.1, 0.1), atol=1e-12)
+
+
+def test_a_law_of_what_the_drives_push_is_shown_by_itself() -> None:
+    x, pushed = 0.3 * np.sin(2.0 * T), np.cos(3.0 * T)
+    structure, column = alone(placed(known_terms()["drive_x1_v0"], "motor_bearing"))
+    moved = Record("moved", DT, {"moved": x, "carried": pushed}, {})
+    out = simulate(structure, {STIFFNESS: 2.0, "b_10": -0.5}, moved)
+    force = out[structure.rig.outputs[column].name]
+    np.testing.assert_allclose(force, 2.0 * x + 0.5 * x * pushed, atol=1e-6)
 
 
 def test_a_push_beside_a_late_drive_needs_no_history() -> None:

@@ -87,7 +87,12 @@ def _composed(effect: Effect) -> tuple[Structure, int]:
         return compose(_signal_alone(effect.reads(canonical.v)), (replace(effect, at=_DRIVE),)), 0
     if effect.place is Place.SENSOR:
         return compose(_signal_alone(False), (replace(effect, at=_SHOWN),)), 1
-    return compose(_joint_alone(effect.reads(canonical.load)), (replace(effect, at=_JOINT),)), 0
+    return compose(_joint_alone(sees_load(effect)), (replace(effect, at=_JOINT),)), 0
+
+
+def sees_load(effect: Effect) -> bool:
+    """Return True for an effect that reads what loads its joint; what drives push alone is taken for all of it here."""
+    return effect.reads(canonical.load) or effect.reads(canonical.driven)
 
 
 def with_probes(rig: Rig) -> Rig:

@@ -29,6 +29,7 @@ from rigsight.diagnose.pushes.probes import (
     load_columns,
     motion_columns,
     push,
+    sees_load,
     way_columns,
     with_probes,
 )
@@ -257,7 +258,7 @@ class Shortlist:
         rig, out = self._context.rig, self._responses.calm_outputs[index]
         if effect.place is Place.ACTUATOR and effect.reads(canonical.v):
             return [out[:, way_columns(rig)[place]]]
-        return [out[:, load_columns(rig)[place]]] if effect.reads(canonical.load) else []
+        return [out[:, load_columns(rig)[place]]] if sees_load(effect) else []
 
     def _starts(self, effect: Effect) -> list[dict[str, float]]:
         """Return start values of the effect's own parameters, with the stiffness of its joint."""

@@ -338,7 +338,10 @@ def _recovered(effect: Effect, bench: Bench, amplitude: float) -> str | None:
         )
     for p in own:
         error = result.standard_errors[p.name]
-        if not error < _SEEN * (abs(truth[p.name]) or size[p.name]):
+        # The parts of a sum count in units of the largest: a small one need not be known as well.
+        summed = effect.linear_parameters if p in effect.linear_parameters else ()
+        alike = [abs(truth[q.name]) for q in (p, *summed) if q.dimension == p.dimension]
+        if not error < _SEEN * (max(alike) or size[p.name]):
             return (
                 f"records do not determine {p.name}: {truth[p.name]:.3g} is estimated with a standard error of {error:.2g}. "
                 "Fix it (fitted=False with a default), or choose starts at which the effect is strong."
