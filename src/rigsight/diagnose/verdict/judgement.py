@@ -210,7 +210,7 @@ def with_unseen(
     """Return the ranking with families that the motion shows and simulations do not see, at their numbers along the motion.
 
     No fit of such a family lowers the error of the equations, and at those numbers it does not raise it: its force is too fast to
-    move the rig, or its phase is lost where the simulation is off.
+    move the rig, or its phase is lost where the simulation is off. What is late shifts the whole motion: simulations see it.
     """
     if proposal is None:
         return ranking
@@ -221,7 +221,10 @@ def with_unseen(
             m.error_over_noise <= reidentified.error_over_noise and stands(m, reidentified, ranking.order)
             for m in forms
         )
-        if is_seen or not starts or cause.share < max(VERDICT.larger_part, proposal.by_chance):
+        is_shown = cause.effect.torque is not None and cause.share >= max(
+            VERDICT.larger_part, proposal.by_chance
+        )
+        if is_seen or not starts or not is_shown:
             continue
         start, form = min(starts, key=lambda own: own[0].unexplained)
         model = as_along_motion(form, start)
