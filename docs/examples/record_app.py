@@ -14,8 +14,10 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[2]
 IMAGES = ROOT / "docs" / "images" / "app"
-_COLORS = 128
-"""Of a picture; more are not told apart."""
+_COLORS = 256
+"""Of a picture."""
+_LARGEST = 150_000
+"""Of a picture, in bytes."""
 
 
 def with_values(text: str) -> str:
@@ -26,6 +28,7 @@ def with_values(text: str) -> str:
 
 
 def main() -> None:
+    from tests.app.first_use import FOREIGN
     from tests.app.served import Server, Visitor
     from tests.chromium import Chromium, find
 
@@ -37,7 +40,7 @@ def main() -> None:
         folder = Path(name)
         make_stage = ROOT / "docs" / "examples" / "make_stage.py"
         subprocess.run([sys.executable, str(make_stage), str(folder / "logger")], check=True)
-        (folder / "logger" / "lunch.csv").write_text("day,dish\nMonday,soup\n", encoding="utf-8")
+        (folder / "logger" / FOREIGN).write_text("day,dish\nMonday,soup\n", encoding="utf-8")
         server = Server(folder / "stage")
         chromium = Chromium(browser, folder / "browser")
         try:
@@ -48,9 +51,9 @@ def main() -> None:
 
 
 def film(window: Visitor, logged: list[Path]) -> None:
-    """Do the tasks, with a picture after each."""
+    """Do the tasks, with a picture of each page."""
     from PIL import Image
-    from tests.app import first_use
+    from tests.app.first_use import do_all
 
     def picture(name: str) -> None:
         window.chromium.settle()
@@ -58,30 +61,10 @@ def film(window: Visitor, logged: list[Path]) -> None:
         window.chromium.picture(file, whole=False)
         with Image.open(file) as image:
             image.quantize(_COLORS).save(file, optimize=True)
+        if (size := file.stat().st_size) > _LARGEST:
+            raise SystemExit(f"{file} has {size} bytes; a picture may have {_LARGEST}.")
 
-    first_use.bring(window, logged)
-    picture("1-files")
-    first_use.remove(window, "lunch.csv")
-    first_use.look(window, "sweep_5N.csv")
-    picture("2-channels")
-    first_use.choose_rig(window, "axis")
-    picture("3-rig")
-    first_use.begin(window)
-    first_use.map_columns(window, with_values)
-    picture("4-campaign")
-    first_use.correct(window)
-    if window.has_step("Check"):
-        first_use.check(window)
-        picture("5-check")
-    first_use.diagnose_halfway(window, lambda: picture("6-running"))
-    first_use.diagnose(window)
-    picture("7-diagnosis")
-    first_use.read_verdict(window, "Coulomb friction")
-    if window.has_step("Next experiment"):
-        first_use.plan(window)
-        picture("8-next-experiment")
-    first_use.export(window)
-    picture("9-export")
+    do_all(window, logged, with_values, "Coulomb friction", picture)
 
 
 if __name__ == "__main__":

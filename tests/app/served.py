@@ -16,9 +16,9 @@ from ..chromium import Chromium
 _PATIENCE = 120.0
 
 
-def wait_for(condition: Callable[[], object], what: str = "a condition") -> None:
-    """Wait until something is true."""
-    deadline = time.monotonic() + _PATIENCE
+def wait_for(condition: Callable[[], object], what: str = "a condition", patience: float = _PATIENCE) -> None:
+    """Wait until something is true, for at most this time [s]."""
+    deadline = time.monotonic() + patience
     while not condition():
         assert time.monotonic() < deadline, f"never: {what}"
         time.sleep(0.05)
@@ -68,7 +68,7 @@ class Visitor:
     def go(self, path: str) -> None:
         """Open a page; the token is known from the first one on."""
         address = self.server.address if path == "/" else self.server.origin + path
-        self.chromium.open(address, 1200, 800)
+        self.chromium.open(address, 1280, 800)
         self._arrive()
 
     def follow(self, link: str) -> None:
@@ -84,25 +84,25 @@ class Visitor:
 
     def step(self, title: str) -> None:
         """Go to a step by its title."""
-        self.follow(next(name for name in self._steps() if name[2:] == title))
+        self.follow(next(name for name in self._steps() if name[2:].partition("\n")[0] == title))
 
-    def has_step(self, title: str) -> bool:
-        """Return whether there is a step of this title."""
-        return any(name[2:] == title for name in self._steps())
+    def is_done(self, title: str) -> bool:
+        """Return whether the step of this title is marked as done."""
+        return f"{title}\ndone" in {name[2:] for name in self._steps()}
 
     def _steps(self) -> list[str]:
         names = self.chromium.evaluate(
             "[...document.querySelectorAll('nav a')].map((e) => e.innerText.trim())"
         )
-        return [name.partition("\n")[0] for name in names]
+        return [str(name) for name in names]
 
     def sees(self, words: str) -> bool:
         """Return whether words are on the page."""
         return bool(self.chromium.evaluate(f"document.body?.innerText.includes({words!r})"))
 
-    def wait_to_see(self, words: str) -> None:
-        """Wait until words are on the page."""
-        wait_for(lambda: self.sees(words), f"'{words}' on the page")
+    def wait_to_see(self, words: str, patience: float = _PATIENCE) -> None:
+        """Wait until words are on the page, for at most this time [s]."""
+        wait_for(lambda: self.sees(words), f"'{words}' on the page", patience)
 
     def press(self, name: str) -> None:
         """Click what has this name: a button, a link or an entry of a list."""

@@ -65,7 +65,7 @@ def logged(tmp_path: Path, axis_rows: dict[str, np.ndarray]) -> list[Path]:
     for name, rows in axis_rows.items():
         lines = ["time_ms,force_N,position_mm", *(f"{1e3 * t:.9g},{u:.9g},{1e3 * x:.9g}" for t, u, x in rows)]
         (folder / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
-    (folder / "lunch.csv").write_text("day,dish\nMonday,soup\n", encoding="utf-8")
+    (folder / first_use.FOREIGN).write_text("day,dish\nMonday,soup\n", encoding="utf-8")
     return sorted(folder.iterdir())
 
 
@@ -81,21 +81,7 @@ def test_a_first_use(
     tmp_path: Path, logged: list[Path], serve: Callable[..., Server], window: Window
 ) -> None:
     visitor = window(serve(tmp_path / "campaign"))
-    first_use.bring(visitor, logged)
-    first_use.remove(visitor, "lunch.csv")
-    first_use.look(visitor, "fit.csv")
-    first_use.choose_rig(visitor, "axis")
-    first_use.begin(visitor)
-    first_use.map_columns(visitor, with_values)
-    first_use.correct(visitor)
-    if visitor.has_step("Check"):
-        first_use.check(visitor)
-    first_use.diagnose_halfway(visitor)
-    first_use.diagnose(visitor)
-    first_use.read_verdict(visitor, "cubic")
-    if visitor.has_step("Next experiment"):
-        first_use.plan(visitor)
-    first_use.export(visitor)
+    first_use.do_all(visitor, logged, with_values, "cubic")
     assert visitor.chromium.complaints() == []
     outside = [
         url
@@ -136,6 +122,11 @@ def test_every_page_has_names_and_can_be_used_by_keyboard(
     visitor.chromium.key("Tab")
     assert visitor.chromium.evaluate("document.activeElement.innerText").startswith("Next")
     visitor.go("/")
+    visitor.chromium.key("Tab")
+    visitor.chromium.key("Enter", text="\r")
+    visitor.chromium.wait("document.activeElement.matches('main.content')")
+    visitor.go("/")
+    visitor.chromium.key("Tab")
     links = "[...document.querySelectorAll('header a, nav a')].map((e) => e.innerText)"
     for link in (*visitor.chromium.evaluate(links), "files"):
         visitor.chromium.key("Tab")
@@ -143,7 +134,7 @@ def test_every_page_has_names_and_can_be_used_by_keyboard(
         assert focused == link
     visitor.chromium.evaluate("[...document.querySelectorAll('nav a')][1].focus()")
     visitor.chromium.key("Enter", text="\r")
-    visitor.wait_to_see("Its rig")
+    visitor.wait_to_see("Is this its rig?")
 
 
 def test_what_is_typed_or_chosen_is_in_the_command_and_there_again_after_a_run(
@@ -232,7 +223,7 @@ def test_a_large_upload_is_not_held_in_memory(
         for _ in range(500):
             file.write(b"1.00,2.0\n1.0,2.0\n" * 58823 + b" " * 9)
     server = serve(tmp_path / "campaign")
-    first_use.bring(window(server), [large])
+    first_use.bring(window(server), [large], lambda _: None)
     kept = server.folder / "large.csv"
     assert kept.stat().st_size == large.stat().st_size == 500_000_000
     peak = re.search(r"VmHWM:\s+(\d+) kB", Path(f"/proc/{server.process.pid}/status").read_text())

@@ -99,9 +99,13 @@ def test_progress_is_read_from_lines_that_may_be_cut(tmp_path: Path) -> None:
     assert job.messages() == ["a note", "rigsight: told."]
 
 
+def done(site: Site) -> set[str]:
+    return {step.title for step in site.steps() if step.is_done}
+
+
 def test_the_state_of_the_steps_is_the_folder(axis_campaign: Path) -> None:
     site = Site(axis_campaign, ("diagnose", "export"))
-    assert [(address, done) for address, _, done in site.steps()] == [
+    assert [(step.address, step.is_done) for step in site.steps()] == [
         ("/", True), ("/rig", True), ("/campaign", True), ("/diagnosis", False), ("/export", False),
     ]  # fmt: skip
     assert [run.command for run in Site(axis_campaign, ("check", "diagnose", "plan")).runs] == [
@@ -113,9 +117,11 @@ def test_the_state_of_the_steps_is_the_folder(axis_campaign: Path) -> None:
     (axis_campaign / "diagnosis" / "report.html").write_text("")
     os.utime(axis_campaign / "campaign.toml", (1, 1))
     assert not site.is_outdated("diagnosis/report.html")
-    os.utime(axis_campaign / "campaign.toml")
+    assert done(site) == {"Files", "Rig", "Campaign", "Diagnosis"}
+    (axis_campaign / "campaign.toml").write_text("titel = 'slip'\n")
     os.utime(axis_campaign / "diagnosis" / "report.html", (1, 1))
     assert site.is_outdated("diagnosis/report.html")
+    assert done(site) == {"Files", "Rig"}
     assert site.results("diagnosis") == ["diagnosis/report.html"]
 
 

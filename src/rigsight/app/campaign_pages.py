@@ -12,8 +12,17 @@ from typing import Any
 from nicegui import ui
 
 from rigsight.app import jobs
-from rigsight.app.page_parts import address_of, page_of, run_panel, telling, text, typed_option, watch
-from rigsight.app.steps import ROBOT_SUFFIXES, Site, picture_of
+from rigsight.app.page_parts import (
+    address_of,
+    next_step,
+    page_of,
+    run_panel,
+    telling,
+    text,
+    typed_option,
+    watch,
+)
+from rigsight.app.steps import ROBOT_SUFFIXES, Site, campaign_errors, picture_of
 from rigsight.app.workspace import (
     CAMPAIGN,
     Draft,
@@ -23,7 +32,6 @@ from rigsight.app.workspace import (
     save_campaign,
     set_aside,
 )
-from rigsight.errors import InputError
 
 _GUESS = ""
 _OF_ROBOT = (
@@ -31,7 +39,15 @@ _OF_ROBOT = (
     ("--lock", "Joints that a brake holds, and where in rad, such as elbow=0.5"),
 )
 _PICTURE = "picture"
-_WORDS = "Which column is which signal, in which unit, and the values of the given simulation. Comments mark guesses."
+_WORDS = (
+    "This text says which column is which signal, and in which unit. Go through the comments (#): they mark what was guessed. "
+    "Under [rig.parameters] type the values of your simulation and remove the # before them; others are identified from the "
+    "records."
+)
+_CHOICE = (
+    "What was measured? A rig is the mechanism with its drives and sensors, as equations; its picture is shown here. With it "
+    f"the campaign begins: one text file, {CAMPAIGN}, that says which column is which signal and marks every guess."
+)
 # The editor has no option for what a screen reader calls it, and is loaded after the page.
 _NAME_THE_FIELD = """(function name() {
   const field = document.querySelector('.cm-content');
@@ -58,12 +74,12 @@ def _chosen(site: Site) -> None:
         with telling():
             ui.notify(f"Moved to {set_aside(site.root, CAMPAIGN)}.")
 
-    text("p", f"The campaign of this folder is {CAMPAIGN}. Its rig:")
+    text("p", f"The campaign of this folder is {CAMPAIGN}. Is this its rig?")
     table = _rig_table(site.root)
     _picture(site, picture_arguments(site.root, model=table.get("model"), file=table.get("file")))
     if output := _begun(site):
         text("pre", output).props('tabindex="0" aria-label="What was written"')
-    ui.link("Next: the campaign", "/campaign").classes("next")
+    next_step(site, "/rig")
     ui.button("Move this campaign aside and begin another", on_click=aside).props("outline no-caps")
 
 
@@ -76,7 +92,7 @@ def _begun(site: Site) -> str:
 def _choice(site: Site) -> None:
     from rigsight.rigs import RIGS
 
-    options = {_GUESS: "Choose the one that matches the channels best"}
+    options = {_GUESS: "Not sure: take the one that fits the columns best"}
     options |= {f"--model {name}": f"{name}: {rig.summary}" for name, rig in RIGS.items()}
     options |= {f"--rigs {name}": f"{name} (rig file)" for name in site.files(".toml")}
     options |= {f"--mjcf {name}": f"{name} (model of a robot)" for name in site.files(*ROBOT_SUFFIXES)}
@@ -96,7 +112,8 @@ def _choice(site: Site) -> None:
         for own in of_robot:
             own.element.visible = option == "--mjcf"
 
-    text("p", "What do the records come from? This writes the campaign, with every guess marked in it.")
+    text("p", _CHOICE)
+    text("p", "None is yours? Bring a rig file or the model of a robot on the page Files.", "hint")
     choice = ui.select(options, value=_GUESS, label="Rig").classes("wide")
     drawn = ui.element("div")
     of_robot = [typed_option(site, "init", name, label) for name, label in _OF_ROBOT]
@@ -167,17 +184,6 @@ def _rig_table(root: Path) -> dict[str, Any]:
     return table if isinstance(table, dict) else {}
 
 
-def campaign_errors(file: Path) -> list[str]:
-    """Return what cannot be used in a campaign, one message per error, without reading its records."""
-    from rigsight.workflow.campaign.campaign_file import read_campaign_table
-
-    try:
-        read_campaign_table(file)
-    except InputError as error:
-        return str(error).splitlines()
-    return []
-
-
 async def campaign_page(site: Site) -> None:
     """Edit the text of the campaign."""
     kept = find_draft(site.root)
@@ -194,8 +200,10 @@ async def campaign_page(site: Site) -> None:
             button = ui.button("Save")
             note = text("p", "" if kept is None else _UNSAVED, "note").props('role="status"')
         errors = ui.element("div").props('role="status" aria-label="Errors"')
-        editor = ui.codemirror(shown, language="TOML", line_wrapping=True).classes("editor")
-        ui.link(*_after(site)).classes("next")
+        editor = ui.codemirror(shown, language="TOML", theme="githubLight", line_wrapping=True).classes(
+            "editor"
+        )
+        next_step(site, "/campaign")
 
     def changed() -> None:
         nonlocal kept
@@ -209,7 +217,7 @@ async def campaign_page(site: Site) -> None:
         found = await asyncio.to_thread(campaign_errors, site.root / CAMPAIGN)
         lines = {int(place[1]) for message in found if (place := _LINE.search(message))}
         editor.decorations = [{"kind": "line", "line": line, "class": "wrong"} for line in sorted(lines)]
-        note.text = "" if found else "Saved, and every key can be used."
+        note.text = "" if found else "Saved; no error in the text."
         errors.clear()
         with errors:
             for message in found:
@@ -242,9 +250,3 @@ def _error(editor: ui.codemirror, message: str) -> None:
             ui.button(f"Go to line {line}", on_click=lambda: editor.reveal_line(line)).props(
                 "flat dense no-caps"
             )
-
-
-def _after(site: Site) -> tuple[str, str]:
-    """Return words and address of the step after the campaign."""
-    following = site.runs[0]
-    return f"Next: {following.title.lower()}", f"/{following.key}"

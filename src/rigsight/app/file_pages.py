@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Container
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -10,58 +11,69 @@ from urllib.parse import quote
 from nicegui import ui
 
 from rigsight.app import jobs
-from rigsight.app.page_parts import address_of, page_of, run_panel, telling, text, watch
+from rigsight.app.page_parts import address_of, next_step, page_of, run_panel, telling, text, watch
 from rigsight.app.steps import OWN_EFFECTS, ROBOT_SUFFIXES, Site, inspection_key, picture_of
 from rigsight.app.workspace import inside, set_aside
 from rigsight.records.formats.known import LARGEST_FILE
-from rigsight.workflow.init import MEASURED_SUFFIXES, measured_files
+from rigsight.workflow.init import MEASURED_SUFFIXES
 
 _UPLOAD = (Path(__file__).parent / "upload.js").read_text(encoding="utf-8")
-_FURTHER = (".toml", OWN_EFFECTS, *ROBOT_SUFFIXES)
+_FURTHER = {
+    ".toml": "rig file",
+    OWN_EFFECTS: "effects of your own",
+    **dict.fromkeys(ROBOT_SUFFIXES, "model of a robot"),
+}
+_OTHER = "not read, unless another file names it"
+_WORDS = (
+    "rigsight names what the simulation of a rig lacks, by comparing it with measurements. The steps on the left lead there, "
+    "from top to bottom. Everything is kept in this folder.",
+    "Begin with what your logger wrote: files with columns for time, inputs and sensors.",
+)
+_KINDS = (
+    f"Measured files: {', '.join(MEASURED_SUFFIXES)}, up to {LARGEST_FILE / 1e9:g} GB each. If you have them: a rig file "
+    f"(.toml), the model of a robot ({', '.join(ROBOT_SUFFIXES)}), effects of your own in Python ({OWN_EFFECTS})."
+)
 _HEADINGS = ("channel", "unit", "samples", "minimum", "maximum", "not finite")
+_NUMBERS = range(2, len(_HEADINGS))
 
 
 def files_page(site: Site) -> None:
     """Show the files of the folder and take further ones."""
     with page_of(site, "/", "Files"):
-        text(
-            "p",
-            "Measured files, a rig file, the model of a robot or effects of your own in Python: drop them anywhere on this "
-            "page, or choose them.",
-        )
+        for words in _WORDS:
+            text("p", words)
         accepted = ",".join((*MEASURED_SUFFIXES, *_FURTHER))
         ui.html(
-            f'<div class="drop"><label for="files">Files</label> '
-            f'<input type="file" id="files" multiple accept="{accepted}"> up to {LARGEST_FILE / 1e9:g} GB each'
+            f'<div class="drop"><label for="files">Drop files anywhere on this page, or choose them:</label> '
+            f'<input type="file" id="files" multiple accept="{accepted}">'
             '<progress id="upload-progress" max="1" value="0" aria-label="Upload" hidden></progress>'
             '<p id="upload-status" role="status"></p></div>',
             sanitize=False,
         )
+        text("p", _KINDS, "hint")
         ui.add_body_html(f"<script>{_UPLOAD}</script>")
 
         @ui.refreshable
         def listed() -> None:
             files = _listed(site)
             if not files:
-                text("p", "This folder holds no such file yet.")
+                text("p", "This folder holds no file yet.")
                 return
             with ui.element("table").props('aria-label="Files"'):
-                _row("th", ("file", "size", "", ""))
-                for name, size, is_measured in files:
-                    _file_row(site, name, size, is_measured)
+                _row("th", ("file", "size", "what it is", ""), numbers=(1,))
+                for name, size in files:
+                    _file_row(site, name, size)
 
         listed()
         watch(lambda: _listed(site), listed.refresh)
-        ui.link("Next: the rig", "/rig").classes("next")
+        next_step(site, "/")
 
 
-def _listed(site: Site) -> list[tuple[str, int, bool]]:
-    measured = {file.name for file in measured_files(site.root)}
-    names = sorted(measured.union(site.files(*_FURTHER)))
-    return [(name, (site.root / name).stat().st_size, name in measured) for name in names]
+def _listed(site: Site) -> list[tuple[str, int]]:
+    return [(name, (site.root / name).stat().st_size) for name in site.files()]
 
 
-def _file_row(site: Site, name: str, size: int, is_measured: bool) -> None:
+def _file_row(site: Site, name: str, size: int) -> None:
     def remove() -> None:
         with telling():
             ui.notify(f"Moved to {set_aside(site.root, name)}.")
@@ -70,16 +82,18 @@ def _file_row(site: Site, name: str, size: int, is_measured: bool) -> None:
         text("td", name)
         text("td", f"{size / 1e3:,.1f} kB", "number")
         with ui.element("td"):
-            if is_measured:
+            if (suffix := Path(name).suffix.lower()) in MEASURED_SUFFIXES:
                 ui.link("Channels", f"/file?name={quote(name)}").props(f'aria-label="Channels of {name}"')
+            else:
+                text("span", _FURTHER.get(suffix, _OTHER))
         with ui.element("td"):
             ui.button("Remove", on_click=remove).props(f'flat dense no-caps aria-label="Remove {name}"')
 
 
-def _row(tag: str, cells: tuple[str, ...]) -> None:
+def _row(tag: str, cells: tuple[str, ...], numbers: Container[int] = ()) -> None:
     with ui.element("tr"):
-        for cell in cells:
-            text(tag, cell)
+        for place, cell in enumerate(cells):
+            text(tag, cell, "number" if place in numbers else "")
 
 
 def file_page(site: Site, name: str) -> None:
@@ -100,17 +114,15 @@ def file_page(site: Site, name: str) -> None:
             if job is not None and job.exit_code == 0:
                 _channels(site, name, json.loads((job.folder / "stdout").read_text(encoding="utf-8")))
 
-        run_panel(
-            site, key, "Inspect again", lambda: site.inspection(name), channels.refresh, shows_output=False
-        )
         channels()
+        run_panel(site, key, "Inspect", lambda: site.inspection(name), channels.refresh, shows_output=False)
         ui.link("All files", "/").classes("next")
 
 
 def _channels(site: Site, name: str, found: dict[str, Any]) -> None:
     text("h2", f"{len(found['channels'])} channels ({found['format']})")
     with ui.element("table").props('aria-label="Channels"'):
-        _row("th", _HEADINGS)
+        _row("th", _HEADINGS, numbers=_NUMBERS)
         for one in found["channels"]:
             ends = ("" if one[end] is None else f"{one[end]:.5g}" for end in ("minimum", "maximum"))
             _row(
@@ -120,8 +132,9 @@ def _channels(site: Site, name: str, found: dict[str, Any]) -> None:
                     one["unit"] or "",
                     str(one["n_samples"]),
                     *ends,
-                    str(one["n_not_finite"] or ""),
+                    str(one["n_not_finite"]),
                 ),
+                numbers=_NUMBERS,
             )
     for one in found["channels"]:
         for remark in one["remarks"]:
@@ -132,5 +145,10 @@ def _channels(site: Site, name: str, found: dict[str, Any]) -> None:
     ui.element("img").props(
         f'src="{address_of(picture_of(name))}?{version}" alt="Plots of the channels of {name}"'
     )
-    text("h2", f"In a campaign, with the rig '{found['proposal']['model']}'")
-    text("pre", found["proposal"]["toml"]).props('tabindex="0" aria-label="Proposed entry"')
+    text("h2", "Its entry in a campaign")
+    text(
+        "p",
+        f"As the rig '{found['proposal']['model']}' would read it, which fits these columns best. The next step writes such an "
+        "entry for every file, for the rig that you choose.",
+    )
+    text("pre", found["proposal"]["toml"], "message").props('tabindex="0" aria-label="Proposed entry"')

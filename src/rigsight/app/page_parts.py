@@ -56,6 +56,7 @@ def page_of(site: Site, current: str, title: str) -> Iterator[None]:
     ui.page_title(f"{title} - {site.root.name} - rigsight")
     # Its own landmark would surround ours.
     ui.query("main.q-page").props("role=presentation")
+    skip = ui.link("Skip to the page").classes("skip")
     with ui.element("header").classes("top"):
         ui.link("rigsight", "/").classes("name")
         text("span", str(site.root), "folder")
@@ -64,19 +65,26 @@ def page_of(site: Site, current: str, title: str) -> Iterator[None]:
 
             @ui.refreshable
             def steps() -> None:
-                for number, (address, name, is_done) in enumerate(site.steps(), 1):
-                    link = ui.link(f"{number} {name}", address)
-                    if address == current:
+                for number, step in enumerate(site.steps(), 1):
+                    link = ui.link(f"{number} {step.title}", step.address)
+                    if step.address == current:
                         link.props('aria-current="page"')
-                    if is_done:
+                    if step.state:
                         with link:
-                            text("span", "done", "done")
+                            text("span", step.state, step.state)
 
             steps()
             watch(site.steps, steps.refresh)
-        with ui.element("main").classes("content"):
+        with ui.element("main").classes("content").props('tabindex="-1"') as main:
+            skip.props(f'href="#{main.html_id}"')
             text("h1", title)
             yield
+
+
+def next_step(site: Site, current: str) -> None:
+    """Link the step after this one."""
+    following = next(after for step, after in pairwise(site.steps()) if step.address == current)
+    ui.link(f"Next step: {following.title}", following.address).classes("next")
 
 
 def watch(state: Callable[[], object], act: Callable[[], object]) -> None:
@@ -96,6 +104,7 @@ def command_shown(arguments: Sequence[str]) -> None:
     """Show a command, to be copied into a terminal."""
     line = jobs.shown(arguments)
     with ui.element("div").classes("command"):
+        text("span", "The same in a terminal:", "hint")
         text("code", line)
         ui.button(icon="content_copy", on_click=lambda: _copied(line)).props(
             'flat dense aria-label="Copy the command"'
@@ -133,7 +142,9 @@ def own_effects_option(site: Site, job: str) -> Option | None:
     if not files:
         return None
     chosen = [file for file in _last(site, job, "--effects") if file in files]
-    field = ui.select(files, value=chosen, multiple=True, label="Effects of your own").classes("wide")
+    field = ui.select(files, value=chosen, multiple=True, label="Effects of your own (optional)").classes(
+        "wide"
+    )
     text("p", _RUNS_CODE, "bad")
     return Option(field, "--effects")
 
@@ -162,41 +173,74 @@ def run_panel(
     def begin() -> None:
         with telling():
             jobs.start(site.root, name, arguments())
-            panel.refresh()
+            show()
 
     @ui.refreshable
-    def panel() -> None:
+    def command() -> None:
         job = jobs.find(site.root, name)
         if job is not None and job.is_running:
             command_shown(job.arguments)
-            _running(job)
             return
         command_shown(arguments())
-        ui.button(label, on_click=begin)
-        if job is not None:
-            _outcome(job, shows_output, is_open)
+        ui.button(label if job is None else f"{label} again", on_click=begin)
+
+    @ui.refreshable
+    def outcome() -> None:
+        job = jobs.find(site.root, name)
+        if job is not None and job.is_running:
+            _running(job)
+        elif job is not None:
+            _ended(job, shows_output, is_open)
+
+    def show() -> None:
+        command.refresh()
+        tell()
+        outcome.refresh()
+
+    def tell() -> None:
+        kind, status.text = _status(jobs.find(site.root, name))
+        status.classes(replace=kind)
 
     def changed() -> None:
-        panel.refresh()
+        show()
         if (now := state()) is not None and not now[1]:
             ended()
 
     with ui.element("section").classes("run").props(f'aria-label="{label}"'):
-        panel()
+        command()
+        # It stays while the rest is drawn anew: a screen reader tells only what changes in an element that it knows.
+        status = text("p", "").props('role="status"')
+        tell()
+        outcome()
         watch(state, changed)
-    return lambda: panel.refresh()
+    return lambda: command.refresh()
+
+
+def _status(job: jobs.Job | None) -> tuple[str, str]:
+    """Return the class and the words that tell how a run is."""
+    if job is None:
+        return "", ""
+    if job.is_running:
+        return "note", "Running ..."
+    if job.exit_code is None:
+        return "bad", "Ended without a result: its process was killed. Start it again."
+    if job.exit_code == 0:
+        return "good", "Done."
+    return "bad", "Canceled." if job.exit_code in jobs.CANCELED else "Not done:"
 
 
 def _running(job: jobs.Job) -> None:
-    words = text("p", "Starting ...").props('role="status"')
-    bar = ui.linear_progress(value=0.0, show_value=False).props('aria-label="Progress" rounded size="10px"')
+    words = text("p", "")
+    bar = ui.linear_progress(value=0.0, show_value=False).props(
+        'aria-label="Progress" rounded size="10px" instant-feedback'
+    )
     ui.button("Cancel", on_click=job.cancel).props("outline")
     notes = text("p", "", "message")
 
     def look() -> None:
         notes.text = "\n".join(job.messages())
         if (found := job.progress()) is not None:
-            left = "" if found.seconds_left is None else f", {_time(found.seconds_left)} left"
+            left = "" if found.seconds_left is None else f", {_time(found.seconds_left)} left in this part"
             words.text = f"{found.text}{left}"
             bar.value = found.share
 
@@ -208,16 +252,7 @@ def _time(seconds: float) -> str:
     return f"about {seconds:.0f} s" if seconds < 90 else f"about {seconds / 60:.0f} min"
 
 
-def _outcome(job: jobs.Job, shows_output: bool, is_open: bool) -> None:
-    code = job.exit_code
-    kind, words = ("bad", "Ended without a result: its process was killed. Start it again.")
-    if code == 0:
-        kind, words = "good", "Done."
-    elif code in jobs.CANCELED:
-        kind, words = "bad", "Canceled."
-    elif code is not None:
-        kind, words = "bad", "Not done:"
-    text("p", words, kind).props('role="status"')
+def _ended(job: jobs.Job, shows_output: bool, is_open: bool) -> None:
     for message in job.messages():
         text("p", message, "message")
     if shows_output and (output := job.output):
@@ -241,7 +276,10 @@ def shown_page(site: Site, path: str, title: str) -> None:
 
 
 def downloads(paths: Sequence[str]) -> None:
-    """List files to take away."""
+    """List files to take away, if there are any."""
+    if not paths:
+        return
+    text("h2", "Files to download")
     with ui.element("ul").classes("files"):
         for path in paths:
             with ui.element("li"):

@@ -9,6 +9,7 @@ from nicegui import ui
 
 from rigsight.app.page_parts import (
     downloads,
+    next_step,
     own_effects_option,
     page_of,
     run_panel,
@@ -49,9 +50,7 @@ def result_page(site: Site, step: Run) -> None:
         for option in options:
             option.element.on_value_change(show_command)
         results()
-        titles = [(address, title) for address, title, _ in site.steps()]
-        address, title = titles[[own for own, _ in titles].index(f"/{step.key}") + 1]
-        ui.link(f"Next: {title.lower()}", address).classes("next")
+        next_step(site, f"/{step.key}")
 
 
 def export_page(site: Site) -> None:
@@ -87,6 +86,5 @@ def export_page(site: Site) -> None:
             return ("export", RESULTS, "--to", target, "--out", out, *robot)
 
         choice.on_value_change(run_panel(site, "export", "Export", arguments))
-        text("h2", "Files")
         exported()
         watch(partial(site.results, EXPORTS), exported.refresh)
