@@ -118,6 +118,20 @@ def test_a_force_that_simulations_do_not_see_is_named_with_its_numbers_along_the
     assert (found.verdict, found.model) == (("effect", along) if is_named else ("unknown", reidentified))
 
 
+@pytest.mark.parametrize(("kappa", "is_named"), [(1.0, True), (1e-2, False)])
+def test_a_ripple_whose_phase_the_simulation_loses_is_named_although_it_would_raise_the_error(
+    reidentified, scored, kappa: float, is_named: bool
+) -> None:
+    absent = with_cost(
+        scored(("torque_ripple",), error_over_noise=10.0, residuals=GAP), reidentified.fit.cost
+    )
+    start = ProposedStart({"T_sin": 1.0, "T_cos": 0.0, "kappa": kappa}, {})
+    seen = replace(proposal(cause("torque_ripple", 0.95)), starts={"torque_ripple": start})
+    along = replace(absent, error_over_noise=14.0, along_motion=True)
+    order = with_unseen(AXIS, reidentified, ranking((absent, 1.0)), seen, lambda *_: along)
+    assert (order.order[0] is along) is is_named
+
+
 def test_a_force_that_no_family_removes_stays_unknown(reidentified, models) -> None:
     order = ranking(*((model, 1.0 / 3.0) for model in models.values()))
     before = Judgement("unknown", reidentified, "")

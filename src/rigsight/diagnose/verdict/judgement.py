@@ -18,6 +18,7 @@ from rigsight.diagnose.policy import FAMILIES, VERDICT
 from rigsight.diagnose.verdict.families import Key, keys_of, main_causes
 from rigsight.diagnose.verdict.plausibility import stands
 from rigsight.diagnose.verdict.ranking import Ranking
+from rigsight.effects import Effect
 from rigsight.inverse import MissingForce, Proposal, ProposedStart
 from rigsight.records.record import Floats
 from rigsight.rigs import Rig
@@ -209,8 +210,9 @@ def with_unseen(
 ) -> Ranking:
     """Return the ranking with families that the motion shows and simulations do not see, at their numbers along the motion.
 
-    No fit of such a family lowers the error of the equations, and at those numbers it does not raise it: its force is too fast to
-    move the rig, or its phase is lost where the simulation is off. What is late shifts the whole motion: simulations see it.
+    No fit of such a family lowers the error of the equations. At those numbers it does not raise it, as its force is too fast to
+    move the rig; or it goes by a position from which the simulation is farther than its wave is long. What is late shifts the
+    whole motion: simulations see it.
     """
     if proposal is None:
         return ranking
@@ -228,9 +230,20 @@ def with_unseen(
             continue
         start, form = min(starts, key=lambda own: own[0].unexplained)
         model = as_along_motion(form, start)
-        if model.residuals and model.error_over_noise <= VERDICT.worthwhile * reidentified.error_over_noise:
+        raises = model.error_over_noise > VERDICT.worthwhile * reidentified.error_over_noise
+        if model.residuals and (not raises or _loses_phase(rig, reidentified, form.effects[0], start)):
             ranking = ranking.with_model(model)
     return ranking
+
+
+def _loses_phase(rig: Rig, reidentified: FittedModel, effect: Effect, start: ProposedStart) -> bool:
+    """Return whether the simulated positions are off by more than a radian of a wave over the position."""
+    if effect.wave_number is None:
+        return False
+    unit = rig.units_at(rig.acts_at(effect))["x"]
+    residuals = np.concatenate(reidentified.residuals)[:, [s.unit == unit for s in rig.outputs]]
+    errors = np.sqrt(np.nanmean(residuals**2, axis=0))
+    return bool(np.all(start.own[effect.wave_number] * errors > 1.0)) if errors.size else False
 
 
 def _of_family(rig: Rig, ranking: Ranking, key: Key) -> list[FittedModel]:
