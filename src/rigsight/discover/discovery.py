@@ -91,7 +91,7 @@ def discover(
         judged = bench.scored(chosen.support, judged.fit)
     if not math.isfinite(judged.error_over_noise):
         raise SimulationError("The refitted equations cannot be simulated on the held-out records.")
-    _check_predicts(judged, bench)
+    check_predicts(judged.error_over_noise, bench.rig.name, bench.held_out, bench.noise)
     say("polished")
     inclusion = {} if along is None else along.inclusion(final, np.random.default_rng(seed))
     say("ensembles")
@@ -102,18 +102,18 @@ def discover(
     return assembled(data, found)
 
 
-def _check_predicts(judged: Trial, bench: Bench) -> None:
+def check_predicts(error: float, rig: str, held_out: Sequence[Record], noise: Mapping[str, float]) -> None:
     """Refuse equations that say less of the held-out records than their means do, for another reason than noise."""
     apart = [
         (record[name] - np.mean(record[name])) / floor
-        for record in bench.held_out
-        for name, floor in bench.noise.items()
+        for record in held_out
+        for name, floor in noise.items()
         if name in record
     ]
-    of_means, error = rms(np.concatenate(apart)), judged.error_over_noise
+    of_means = rms(np.concatenate(apart))
     if error > max(of_means, BY_NOISE):
         raise SimulationError(
-            f"In free run the best equation of {bench.rig.name} leaves {error:.3g} times the noise floor on the held-out "
+            f"In free run the best equation of {rig} leaves {error:.3g} times the noise floor on the held-out "
             f"records; their means alone leave {of_means:.3g}. A rig that is unstable without its controller leaves every free "
             "run. Use 'rigsight diagnose', whose fits follow the sensors of such a rig."
         )
