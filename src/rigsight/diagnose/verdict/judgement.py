@@ -218,7 +218,8 @@ def with_unseen(
         return ranking
     for cause in proposal.alone:
         forms = _of_family(rig, ranking, (cause.family, cause.where))
-        starts = [(proposal.starts[m.names[0]], m) for m in forms if m.names[0] in proposal.starts]
+        alone = [m for m in forms if len(m.effects) == 1 and m.names[0] in proposal.starts]
+        starts = [(proposal.starts[m.names[0]], m) for m in alone]
         is_seen = any(
             m.error_over_noise <= reidentified.error_over_noise and stands(m, reidentified, ranking.order)
             for m in forms
