@@ -191,10 +191,21 @@ def _module(kind: str) -> ModuleType:
     return import_module(f"rigsight.simulators.{kind}_program")
 
 
-class simulated(sp.Function):  # type: ignore[misc]  # noqa: N801
-    """``simulated(key, index, *arguments)``: see `mass_leaf` and `force_leaf`."""
+class _OfProgram(sp.Function):  # type: ignore[misc]
+    """What another program computes: a number where all arguments are."""
 
     is_real = True
+
+    def _eval_evalf(self, prec: int) -> sp.Expr | None:
+        # Where sympy asks for a sign it evaluates arguments to two bits, and the key of the bodies with them.
+        if not all(argument.is_number for argument in self.args):
+            return None
+        numbers = [a if a.is_Integer else float(a) for a in self.args]
+        return sp.Float(self._imp_(*numbers), prec)
+
+
+class simulated(_OfProgram):  # noqa: N801
+    """``simulated(key, index, *arguments)``: see `mass_leaf` and `force_leaf`."""
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
         """Return the slope by one of the arguments."""
@@ -208,10 +219,8 @@ class simulated(sp.Function):  # type: ignore[misc]  # noqa: N801
         return _shaped(_values(key, index, arguments), arguments)
 
 
-class simulated_slope(sp.Function):  # type: ignore[misc]  # noqa: N801
+class simulated_slope(_OfProgram):  # noqa: N801
     """``simulated_slope(key, index, argument, *arguments)``: its derivative by one argument; how that changes is left out."""
-
-    is_real = True
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:  # noqa: ARG002
         """Return zero: only first derivatives are asked for."""
