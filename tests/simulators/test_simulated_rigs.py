@@ -12,6 +12,7 @@ import sympy as sp
 
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
+from rigsight.identify.rig_equations import equations_of
 from rigsight.records import Record
 from rigsight.rigs import read_rig_file, rig_of_tables
 from rigsight.rigs.reading.rig_file import rig_of_text
@@ -349,3 +350,13 @@ def test_reading_a_rig_file_runs_no_fmu(folder, monkeypatch):
     monkeypatch.setattr("rigsight.simulators.fmu_program.ctypes.CDLL", None)
     cart.written_fmu(folder / "looked_at.fmu")
     assert rig_of_text(cart.RIG + cart.FMU.replace("FILE", "looked_at.fmu"), folder=folder).name
+
+
+def test_a_number_of_a_program_is_the_same_to_two_bits(folder) -> None:
+    # To as many sympy evaluates where it asks for a sign.
+    masses = equations_of(rig_of("python", folder)).mass_entries
+    leaf = next(leaf for entry in masses for leaf in entry.atoms(sp.Function))
+    at = {symbol: sp.Float(0.3 + 0.1 * i) for i, symbol in enumerate(sorted(leaf.free_symbols, key=str))}
+    number = leaf.xreplace(at)
+    assert float(number.evalf(2)) == pytest.approx(float(number.evalf(15)), rel=0.05)
+    assert not (1 / number).is_zero
