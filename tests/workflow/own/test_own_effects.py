@@ -153,6 +153,10 @@ def test_files_that_are_none_are_told(tmp_path: Path):
     binary.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match="is not UTF-8 text"):
         own_effects([binary])
+    other = tmp_path / "rig.toml"
+    other.write_text("raise_what = 1", "utf-8")
+    with pytest.raises(InputError, match=r"\.py"):
+        own_effects([other])
 
 
 def test_a_file_named_twice_is_read_once(monkeypatch: pytest.MonkeyPatch):

@@ -65,6 +65,8 @@ def run_python_file(path: Path, what: str, if_missing: str) -> tuple[ModuleType,
     if not path.exists():
         raise InputError(f"{path} does not exist; {if_missing}")
     source = text_of(path, what, _LARGEST_FILE)
+    if path.suffix != ".py":
+        raise InputError(f"{path} is not {what}: its name would end in .py.")
     try:
         tree = ast.parse(source, filename=str(path))
         code = compile(tree, str(path), "exec", dont_inherit=True)

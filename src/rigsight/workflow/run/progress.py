@@ -51,7 +51,8 @@ class Stage:
         self._total = total
         self._listener = listener
         self._done = 0
-        listener(Step(name, "", 0, total))
+        if total:  # A step of none would be a remark.
+            listener(Step(name, "", 0, total))
 
     def finished(self, detail: str) -> None:
         """Report one more finished step."""
