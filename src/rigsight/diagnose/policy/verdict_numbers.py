@@ -187,6 +187,10 @@ class FamilyNumbers:
         "Share of the ranking that a family keeps at least: where no law is exact, held-out errors exclude none.",
         "seen on two measured rigs only (a pendulum, an electronic oscillator), not validated",
     )
+    lost_phase: float = convention(
+        1.0,
+        "Error of a simulated position, in radians of a wave over it, from which the simulation does not know the phase of the wave.",
+    )
     probable: float = convention(
         0.5,
         "Probability from which the motion names a family, or a model a further one: it is more probable than not.",

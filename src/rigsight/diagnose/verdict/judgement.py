@@ -238,13 +238,13 @@ def with_unseen(
 
 
 def _loses_phase(rig: Rig, reidentified: FittedModel, effect: Effect, start: ProposedStart) -> bool:
-    """Return whether the simulated positions are off by more than a radian of a wave over the position."""
+    """Return whether the simulated positions are so far off that the phase of a wave over the position is lost."""
     if effect.wave_number is None:
         return False
     unit = rig.units_at(rig.acts_at(effect))["x"]
     residuals = np.concatenate(reidentified.residuals)[:, [s.unit == unit for s in rig.outputs]]
     errors = np.sqrt(np.nanmean(residuals**2, axis=0))
-    return bool(np.all(start.own[effect.wave_number] * errors > 1.0)) if errors.size else False
+    return bool(errors.size) and bool(np.all(start.own[effect.wave_number] * errors > FAMILIES.lost_phase))
 
 
 def _of_family(rig: Rig, ranking: Ranking, key: Key) -> list[FittedModel]:
