@@ -19,10 +19,10 @@ from rigsight.inverse.missing_force import MissingForce as MissingForce
 from rigsight.inverse.missing_force import forces_along as forces_along
 from rigsight.inverse.missing_force import missing_forces as missing_forces
 from rigsight.inverse.missing_force import noise_of_rows as noise_of_rows
-from rigsight.inverse.numbers_beside import NumbersBeside as NumbersBeside
 from rigsight.inverse.power import NAMED_IN as NAMED_IN
 from rigsight.inverse.power import NamedSize as NamedSize
 from rigsight.inverse.power import named_sizes as named_sizes
+from rigsight.inverse.proposal import NumbersBeside as NumbersBeside
 from rigsight.inverse.proposal import Proposal as Proposal
 from rigsight.inverse.proposal import ProposedCause as ProposedCause
 from rigsight.inverse.proposal import ProposedForm as ProposedForm

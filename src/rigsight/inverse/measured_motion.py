@@ -10,17 +10,21 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
-from scipy.signal import butter, sosfiltfilt
+from scipy.interpolate import make_interp_spline
+from scipy.signal import butter, savgol_filter, sosfiltfilt
 
 from rigsight.identify.rig_equations import FUNCTIONS, RigEquations, equations_of
 from rigsight.identify.start.measured_states import measured_states, sensor_factors
-from rigsight.inverse.smooth_signals import shifted, slope
 from rigsight.records import Record
 from rigsight.rigs import Rig, reading_symbol
 from rigsight.simulate.prescribed_motion import accelerated_motion, smooth_motion
 
 Floats = NDArray[np.float64]
 
+_DEGREE = 5
+"""Of the spline through the samples."""
+_NEAR = 9
+"""Samples through which a polynomial is laid for a derivative: exact to 1e-4 up to a ninth of the sample rate."""
 _OF_MOTION = 0.99
 """Share of the power of all velocities below the end of the band of a motion."""
 WIDER = 3.0
@@ -340,3 +344,17 @@ def record_motion(rig: Rig, record: Record, values: Mapping[str, float]) -> Reco
 def along_change(by_motion: Floats, change: tuple[Floats, Floats]) -> Floats:
     """Return the change of the equations by small changes of `z` and `a`, shape (n_equations, n_samples)."""
     return np.asarray(np.einsum("ekt,kt->et", by_motion, np.concatenate(change)))
+
+
+def shifted(signal: Floats, dt: float, ahead: float) -> Floats:
+    """Return a signal, shape (n_samples,), at times that are ahead by so much; beyond its ends it stays as it is."""
+    time = np.arange(signal.size) * dt
+    smooth = make_interp_spline(time, signal, k=min(_DEGREE, signal.size - 1))
+    return np.asarray(smooth(np.clip(time + ahead, 0.0, time[-1])))
+
+
+def slope(rows: Floats, dt: float) -> Floats:
+    """Return the derivative of rows, shape (.., n_samples), with respect to time."""
+    n = rows.shape[-1]
+    near = min(_NEAR, n - 1 + n % 2)
+    return np.asarray(savgol_filter(rows, near, near - 1, deriv=1, delta=dt, axis=-1))

@@ -32,10 +32,10 @@ from rigsight.inverse.equation_fit import (
     undriven_inertias,
     with_all_inputs,
 )
+from rigsight.inverse.measured_motion import shifted
 from rigsight.inverse.missing_force import missing_forces, noise_of_rows
 from rigsight.inverse.proposal import Proposal
 from rigsight.inverse.selection import Selection
-from rigsight.inverse.smooth_signals import shifted
 from rigsight.inverse.term import Term
 from rigsight.inverse.tone_terms import of_tone
 from rigsight.simulate import compose

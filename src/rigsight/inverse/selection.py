@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from rigsight.effects import Effect, Family
 from rigsight.inverse.equation_fit import LAW_ERROR, EquationFit
 from rigsight.inverse.measured_motion import WIDER
-from rigsight.inverse.numbers_beside import NumbersBeside
-from rigsight.inverse.proposal import Proposal, ProposedCause, ProposedForm, ProposedStart
+from rigsight.inverse.proposal import NumbersBeside, Proposal, ProposedCause, ProposedForm, ProposedStart
 from rigsight.inverse.regression import STRETCHES, Regression
 from rigsight.inverse.term import Term
 from rigsight.rigs import Rig, evaluated

@@ -12,9 +12,8 @@ from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.inverse.equation_fit import EquationFit
-from rigsight.inverse.measured_motion import RecordMotion, along_change
+from rigsight.inverse.measured_motion import RecordMotion, along_change, shifted
 from rigsight.inverse.parameter_grid import grid_of
-from rigsight.inverse.smooth_signals import shifted
 from rigsight.inverse.term import Term, compiled
 
 Floats = NDArray[np.float64]

@@ -189,7 +189,7 @@ class FamilyNumbers:
     )
     lost_phase: float = convention(
         1.0,
-        "Error of a simulated position, in radians of a wave over it, from which the simulation does not know the phase of the wave.",
+        "Error of a simulated position, in radians of a wave over it, from which the simulation has lost the phase of the wave.",
     )
     probable: float = convention(
         0.5,
