@@ -258,21 +258,21 @@ def _of_joint(
         one_sided = (False,) * len(linear)
     else:
         one_sided = tuple(p.lower >= 0.0 for p in linear) or (True,)
-    for inner in grid_of(effect, linear, scales) if points is None else points:
-        nothing = dict.fromkeys((p.name for p in linear), 0.0)
-        own = [{**inner, **nothing, p.name: unit} for p, unit in zip(linear, units, strict=True)] or [
-            dict(inner)
-        ]
+    nothing = dict.fromkeys((p.name for p in linear), 0.0)
+    tried, rows = list(grid_of(effect, linear, scales) if points is None else points), []
+    for inner in tried:
+        own = [{**inner, **nothing, p.name: unit} for p, unit in zip(linear, units, strict=True)] or [inner]
+        along = list(zip(fit.motions, moved, strict=True))
         try:
-            columns = tuple(
-                motion.thinned(np.array([generalized(motion, effect, o, values, along) for o in own]))
-                for motion, along in zip(fit.motions, moved, strict=True)
-            )
+            rows.append([[generalized(m, effect, o, values, joint) for o in own] for m, joint in along])
         except RigsightError:
-            return
+            break
+    # All points at once: a filter costs as much for one of them as for all.
+    filtered = [m.thinned(np.array(own)) for m, own in zip(fit.motions, zip(*rows, strict=True), strict=False)]
+    names, most = tuple(p.name for p in linear), tuple(max(map(abs, p.search)) for p in linear)
+    for inner, *columns in zip(tried, *filtered, strict=False):
         if all(np.all(np.isfinite(column)) for column in columns):
-            names, most = tuple(p.name for p in linear), tuple(max(map(abs, p.search)) for p in linear)
-            yield Term(effect, inner, names, tuple(units), columns, one_sided, most)
+            yield Term(effect, inner, names, tuple(units), tuple(columns), one_sided, most)
 
 
 def is_late(effect: Effect) -> bool:

@@ -161,9 +161,9 @@ class RecordMotion:
     def with_reading_changed(
         self, name: str, change: Floats, values: Mapping[str, float]
     ) -> tuple[Floats, Floats] | None:
-        """Return the changes of `z` and `a` by a small change of one reading; None where it reads no coordinate or rate alone.
+        """Return the changes of `z` and `a` by small changes of one reading; None where it reads no coordinate or rate alone.
 
-        The change is smooth: it is differentiated as it is.
+        Changes, shape (.., n_samples), are smooth: they are differentiated as they are.
         """
         equations, n, dt = self.equations, self.equations.n_coordinates, self.record.dt
         p = equations.parameters(values, self.record)
@@ -176,14 +176,14 @@ class RecordMotion:
         of_sensors = np.moveaxis(slopes[:, first : first + n], 2, 0)
         if not np.any(np.ptp(of_sensors, axis=0)):
             of_sensors = of_sensors[:1]
-        by_reading = np.linalg.pinv(of_sensors)[:, :, own].T * change
-        z = np.zeros_like(self.z)
-        z[first : first + n] = by_reading
+        by_reading = np.linalg.pinv(of_sensors)[:, :, own].T * change[..., None, :]
+        z = np.zeros((*change.shape[:-1], *self.z.shape))
+        z[..., first : first + n, :] = by_reading
         if reads_place:
-            z[n : 2 * n] = slope(by_reading, dt)
+            z[..., n : 2 * n, :] = slope(by_reading, dt)
         else:
-            z[:n] = cumulative_trapezoid(by_reading, dx=dt, axis=1, initial=0)
-        return z, slope(z[n : 2 * n], dt)
+            z[..., :n, :] = cumulative_trapezoid(by_reading, dx=dt, initial=0)
+        return z, slope(z[..., n : 2 * n, :], dt)
 
     def ahead(self, time: float) -> tuple[Floats, Floats]:
         """Return the changes of `z` and `a` if the whole motion were ahead by so much time."""
@@ -342,8 +342,8 @@ def record_motion(rig: Rig, record: Record, values: Mapping[str, float]) -> Reco
 
 
 def along_change(by_motion: Floats, change: tuple[Floats, Floats]) -> Floats:
-    """Return the change of the equations by small changes of `z` and `a`, shape (n_equations, n_samples)."""
-    return np.asarray(np.einsum("ekt,kt->et", by_motion, np.concatenate(change)))
+    """Return the change of the equations by small changes of `z` and `a`, shape (.., n_equations, n_samples)."""
+    return np.asarray(np.einsum("ekt,...kt->...et", by_motion, np.concatenate(change, axis=-2)))
 
 
 def shifted(signal: Floats, dt: float, ahead: float) -> Floats:

@@ -54,28 +54,43 @@ def of_sensor(
     linear = [p for p in fitted if not slopes[p].has(sp.Symbol(p.name, real=True))]
     if any(slopes[p].has(sp.Symbol(other.name, real=True)) for p in linear for other in linear):
         return
+    tried: list[Mapping[str, float]] = []
+    changes: list[list[Floats]] = [[] for _ in fit.motions]
     for inner in grid_of(effect, linear, scales) if points is None else points:
         arguments = (canonical.reading, *(sp.Symbol(own, real=True) for own in inner))
-        columns = []
-        for motion, by in zip(fit.motions, by_motion, strict=True):
-            changes = [-compiled(slopes[p], arguments)(motion.record[name], *inner.values()) for p in linear]
-            parts = [influence(motion, by, values, name, change) for change in changes]
-            if any(part is None for part in parts):
-                return
-            columns.append(motion.thinned(np.array(parts)))
-        names, sided = tuple(p.name for p in linear), tuple(p.lower >= 0.0 for p in linear)
-        yield Term(effect, inner, names, (1.0,) * len(linear), tuple(columns), sided)
+        laws = [compiled(slopes[p], arguments) for p in linear]
+        here = [np.array([-law(m.record[name], *inner.values()) for law in laws]) for m in fit.motions]
+        if not all(np.all(np.any(change, axis=-1)) for change in here):
+            break
+        tried.append(inner)
+        for own, change in zip(changes, here, strict=True):
+            own.append(change)
+    if not tried:
+        return
+    # All points at once: a filter costs as much for one of them as for all.
+    columns = []
+    for motion, by, own in zip(fit.motions, by_motion, changes, strict=True):
+        rows = influence(motion, by, values, name, np.array(own))
+        if rows is None:
+            return
+        columns.append(motion.thinned(rows))
+    names, sided = tuple(p.name for p in linear), tuple(p.lower >= 0.0 for p in linear)
+    for inner, *here in zip(tried, *columns, strict=True):
+        yield Term(effect, inner, names, (1.0,) * len(linear), tuple(here), sided)
 
 
 def influence(
     motion: RecordMotion, by_motion: Floats, values: Mapping[str, float], name: str, change: Floats
 ) -> Floats | None:
-    """Return the change of the residual of the rig's equations by a small change of a reading; None where it has none."""
-    if not np.any(change):
+    """Return the change of the residual of the rig's equations by small changes of a reading, shape (.., n_samples).
+
+    None where one of them has none.
+    """
+    if not np.all(np.any(change, axis=-1)):
         return None
     if not motion.equations.n_states:
-        rows = np.zeros((len(motion.sensors), change.size))
-        rows[[motion.equations.sensor_names[i] for i in motion.sensors].index(name)] = -change
+        rows = np.zeros((*change.shape[:-1], len(motion.sensors), change.shape[-1]))
+        rows[..., [motion.equations.sensor_names[i] for i in motion.sensors].index(name), :] = -change
         return rows
     moved = motion.with_reading_changed(name, change, values)
     return None if moved is None else along_change(by_motion, moved)
