@@ -13,8 +13,6 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import TypeVar
 
-from joblib import Parallel, delayed
-
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -45,6 +43,8 @@ class IdleThreads:
         if self._n_jobs == 1:
             yield from map(one, items)
             return
+        # Not above: one thread does not need it, and it takes a tenth of a second to load.
+        from joblib import Parallel, delayed
 
         def counted(item: Item) -> Result:
             with self.one_busy():
