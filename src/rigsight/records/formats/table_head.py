@@ -77,11 +77,6 @@ def _quoted(line: str, separator: str) -> list[str]:
         return line.split(separator)
 
 
-def is_comment(line: str, comment: str | None) -> bool:
-    """Return True for a comment line; `comment` is the sign in use, None for any usual one."""
-    return line.lstrip().startswith(comment or COMMENT_SIGNS)
-
-
 def sniff(lines: Sequence[str], separator: str | None, decimal: str | None) -> Dialect:
     """Return the dialect in which most cells of equally wide rows are numbers."""
     sample = _whole_up_to(lines[:LINES_LOOKED_AT])

@@ -25,11 +25,11 @@ from rigsight.records.formats.channel import (
 )
 from rigsight.records.formats.known import LARGEST_FILE, check_largest
 from rigsight.records.formats.table_head import (
+    COMMENT_SIGNS,
     LAST_LINES,
     MOST_HEAD,
     Dialect,
     HeadedText,
-    is_comment,
     looks_like_names,
     sniff,
     without_comment,
@@ -146,9 +146,9 @@ def _names_in_comment(
     lines: Sequence[str], first_row: int, dialect: Dialect, width: int, comment: str | None
 ) -> tuple[str, ...] | None:
     """Return the names in a commented header right above the first row, where there is one."""
-    if first_row < 2 or not is_comment(lines[first_row - 2], comment):
+    above = lines[first_row - 2].strip() if first_row > 1 else ""
+    if not above.startswith(comment or COMMENT_SIGNS):
         return None
-    above = lines[first_row - 2].strip()
     names = [
         printable(name)
         for name in dialect.cells(above.removeprefix(comment) if comment else above.lstrip("#%/"))
@@ -178,7 +178,8 @@ class TextColumns:
                 f"{path.name}: separator and decimal sign are both '{decimal}'; name two different ones."
             )
         lines = read_text(path).split("\n")
-        kept = [i for i, line in enumerate(lines, 1) if line.strip() and not is_comment(line, comment)]
+        signs = comment or COMMENT_SIGNS
+        kept = [i for i, line in enumerate(map(str.strip, lines), 1) if line and not line.startswith(signs)]
         if not kept:
             raise InputError(
                 f"{path.name} is empty (nothing but blank or comment lines): a header and rows of numbers are needed."
@@ -318,9 +319,14 @@ class TextColumns:
     def _check_widths(self) -> None:
         """Refuse rows of another width: a cut last line, or a decimal comma between commas."""
         dialect, width = self._layout.dialect, len(self._layout.names)
-        for text, number in zip(self._texts, self._rows, strict=True):
-            n_cells = len(text.split()) if dialect.separator == " " else text.count(dialect.separator) + 1
-            if n_cells != width and (n_cells := len(dialect.cells(text))) != width:
+        sign, n_signs, texts = dialect.separator, width - 1, enumerate(self._texts)
+        # Separators within quotes are none.
+        if sign == " ":
+            odd = [i for i, text in texts if len(text.split()) != width]
+        else:
+            odd = [i for i, text in texts if text.count(sign) != n_signs]
+        for text, number in ((self._texts[i], self._rows[i]) for i in odd):
+            if (n_cells := len(dialect.cells(text))) != width:
                 remedy = (
                     "The file ends there: delete the incomplete line."
                     if number == self._rows[-1]
