@@ -19,7 +19,7 @@ from scipy.integrate import solve_ivp
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import diagnose
+from rigsight.diagnose.diagnosis import diagnose
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.excitation import log_sweep, step
 from rigsight.records import Kind, Record, Role

@@ -21,9 +21,8 @@ from sklearn.model_selection import LeaveOneOut
 from table import is_judgeable, read_table
 
 import rigsight.diagnose.verdict
-from rigsight.diagnose import Calibration
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.verdict.calibration import FILE
+from rigsight.diagnose.verdict.calibration import FILE, Calibration
 from rigsight_bench.scoring.training_trial import TrainingTrial
 
 TARGET = Path(rigsight.diagnose.verdict.__file__).parent / FILE

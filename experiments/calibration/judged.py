@@ -21,8 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from rigsight.diagnose import Calibration
-from rigsight.diagnose.verdict.calibration import trained
+from rigsight.diagnose.verdict.calibration import Calibration, trained
 from rigsight.effects import AT
 from rigsight_bench.scoring.goals import is_clear
 from rigsight_bench.scoring.probability_scores import ALL, probability_scores, scores_of

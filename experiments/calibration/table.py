@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
-from rigsight.diagnose import Situation
+from rigsight.diagnose.verdict.calibration import Situation
 from rigsight_bench.scoring.training_trial import TrainingTrial
 
 FILE = Path(__file__).parent / "trials.csv"

@@ -21,9 +21,8 @@ from typing import Any
 import numpy as np
 from plants import Drawn, drawn
 
-from rigsight.diagnose import candidates_on
 from rigsight.diagnose.bootstrap import uncertainty_of
-from rigsight.diagnose.fit_context import FittedModel
+from rigsight.diagnose.fit_context import FittedModel, candidates_on
 from rigsight.diagnose.search.nested_models import in_lowest_basins
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import RigsightError

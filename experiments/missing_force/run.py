@@ -11,7 +11,7 @@ import json
 from pathlib import Path
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import candidates_on
+from rigsight.diagnose.fit_context import candidates_on
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.errors import SimulationError
 from rigsight.inverse import propose

@@ -25,8 +25,8 @@ sys.path.insert(0, str(HERE.parent / "coverage"))
 from plants import Drawn, drawn  # noqa: E402
 
 from rigsight.campaign import Campaign  # noqa: E402
-from rigsight.diagnose import candidates_on, examination  # noqa: E402
-from rigsight.diagnose.fit_context import FittedModel  # noqa: E402
+from rigsight.diagnose import examination  # noqa: E402
+from rigsight.diagnose.fit_context import FittedModel, candidates_on  # noqa: E402
 from rigsight.diagnose.noise.adequacy import Checks  # noqa: E402
 from rigsight.diagnose.policy import VERDICT  # noqa: E402
 from rigsight.diagnose.search.evidence_for_more import OtherForms  # noqa: E402

@@ -16,8 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose import candidates_on
-from rigsight.diagnose.fit_context import FitContext
+from rigsight.diagnose.fit_context import FitContext, candidates_on
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.diagnose.search.starts import start_values
 from rigsight.diagnose.search.worth_fitting import search_places

@@ -19,7 +19,7 @@ from typing import Any
 from cases import Case, cases
 from threadpoolctl import threadpool_limits
 
-from rigsight.diagnose import diagnose
+from rigsight.diagnose.diagnosis import diagnose
 
 SHARE = 1e-9
 BUILDS: dict[str, dict[str, str]] = {

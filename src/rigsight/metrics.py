@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+TWO_SIDED = 1.96
+"""Standard deviations of a 95 % interval."""
+
 
 def rms(signal: NDArray[np.float64]) -> float:
     """Return the root mean square of a signal of shape (n_samples,)."""

@@ -11,7 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import Diagnosis, diagnose
+from rigsight.diagnose.diagnosis import diagnose
+from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.excitation import linear_sweep

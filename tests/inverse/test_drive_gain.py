@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from rigsight.diagnose import candidates_on
+from rigsight.diagnose.fit_context import candidates_on
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.inverse import propose
 from rigsight.inverse.drive_gain import changed, gains_of_known_scale, slopes_of_changes

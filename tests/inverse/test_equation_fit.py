@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigsight.diagnose import candidates_on
+from rigsight.diagnose.fit_context import candidates_on
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.inverse import EquationFit, propose, record_motions
 from rigsight.rigs import RIGS, Rig

@@ -10,7 +10,7 @@ import pytest
 import sympy as sp
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import candidates_on
+from rigsight.diagnose.fit_context import candidates_on
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.effects.symbols import v
 from rigsight.inverse import Proposal, along_motion, propose

@@ -26,7 +26,7 @@ from rigsight.diagnose.noise.detection import NoiseFloor
 from rigsight.diagnose.result import Candidate, Diagnosis, Estimate, OutputGap
 from rigsight.effects import Family, effect_named
 from rigsight.inverse import MissingForce, Proposal, ProposedCause
-from rigsight.report import render_report
+from rigsight.report.render import render_report
 
 NOISE = {"psi": 4e-4, "y": 3e-5, "force": 12.0}
 SIZE = {"psi": 0.06, "y": 0.004, "force": 900.0}

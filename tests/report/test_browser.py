@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose.result import Diagnosis
-from rigsight.report import render_report
+from rigsight.report.render import render_report
 
 from ..chromium import BROWSERS, Chromium, find
 

@@ -11,8 +11,8 @@ import pytest
 
 from rigsight.diagnose.location.gap_parts import Localization
 from rigsight.diagnose.result import Diagnosis
-from rigsight.report import render_report
 from rigsight.report.location import force_maps, joint_maps, output_maps
+from rigsight.report.render import render_report
 from rigsight.report.sections import interval_text
 from rigsight.report.wording import missing_force_sentence
 

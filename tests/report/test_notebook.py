@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 
 import pytest
 
-from rigsight.diagnose import Diagnosis
+from rigsight.diagnose.result import Diagnosis
 from rigsight.report.terminal import diagnosis_html
 
 KINDS = (

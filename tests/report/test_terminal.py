@@ -9,7 +9,7 @@ from rich.console import Console
 
 from rigsight.diagnose.data_quality.finding import DataQuality, Finding
 from rigsight.diagnose.result import Diagnosis
-from rigsight.report import summary
+from rigsight.report.terminal import summary
 
 
 def printed(diagnosis: Diagnosis, encoding: str = "ascii", width: int = 200) -> list[str]:

@@ -11,7 +11,7 @@ from rigsight.diagnose.result import Diagnosis
 from rigsight.diagnose.trust.patterns import Pattern, Role, meaning
 from rigsight.diagnose.trust.statement import GroupValue, ParameterTrust, Trust, statement
 from rigsight.errors import InputError
-from rigsight.report import render_report
+from rigsight.report.render import render_report
 from rigsight.report.sections import trust_line
 
 BY_AMPLITUDE = tuple(GroupValue(f"{a} A", value, 0.05) for a, value in ((0.5, 2.1), (1.0, 1.7), (2.0, 1.4)))

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigsight.diagnose import Diagnosis
+from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.identify.transfer.conicity import creep_factor

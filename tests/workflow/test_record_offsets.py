@@ -12,8 +12,8 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.compare.comparison import Competitor
-from rigsight.diagnose import Diagnosis
 from rigsight.diagnose.noise.detection import noise_floors
+from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.excitation import linear_sweep

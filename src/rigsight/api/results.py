@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, get_args
 
-from rigsight.diagnose import Diagnosis
 from rigsight.diagnose.location.trace import STAGES
+from rigsight.diagnose.result import Diagnosis
 from rigsight.discover import Discovery
 from rigsight.effects import Effect
 from rigsight.errors import InputError, check_option

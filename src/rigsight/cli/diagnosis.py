@@ -49,7 +49,7 @@ def demo(
     if output.json:
         show_json(out / "diagnosis.json")
     elif not output.quiet:
-        from rigsight.report import summary
+        from rigsight.report.terminal import summary
 
         show(summary(diagnosis))
         typer.echo(
@@ -80,7 +80,7 @@ def diagnose(
     files or none.
     """
     with output.reporting(GOES_ON) as listener:
-        from rigsight.report import summary
+        from rigsight.report.terminal import summary
         from rigsight.workflow.diagnose import run_diagnose
 
         read, command = own.named(effect, listener), command_line()
@@ -232,7 +232,7 @@ def _plan_summary(found: Plan) -> Group:
     from rich.console import Group
     from rich.markup import escape
 
-    from rigsight.report.check_and_plan import plan_headline, promise
+    from rigsight.report.plan import plan_headline, promise
 
     rivals = [(one.effects, f"{one.probability:.2f}", f"{one.rms_left:.3g} errors") for one in found.rivals]
     limits = [(limit.name, f"{limit.value:g}", f"{largest:.3g}") for limit, largest in found.limits]

@@ -78,7 +78,7 @@ def identify(
     determine into DIR; all files or none. With --effect, model.json holds the rig with these effects.
     """
     with output.reporting() as listener:
-        from rigsight.report import identification_summary
+        from rigsight.report.identification import identification_summary
         from rigsight.workflow.identify import run_identify
 
         # Effects of installed packages are checked only where some may be named.
@@ -180,7 +180,7 @@ def compare(
     Writes comparison.json, comparison.csv, comparison.html and figures into DIR; all files or none.
     """
     with output.reporting() as listener:
-        from rigsight.report import comparison_summary
+        from rigsight.report.comparison import comparison_summary
         from rigsight.workflow.compare import run_compare
 
         found = run_compare(

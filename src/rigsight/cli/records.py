@@ -322,7 +322,7 @@ def _check_summary(found: Check) -> Group:
     from rich.console import Group
     from rich.markup import escape
 
-    from rigsight.report.check_and_plan import check_headline, forms, rivals
+    from rigsight.report.check import check_headline, forms, rivals
 
     findings = [(r.severity, f"{r.sentence} {r.remedy}") for r in found.remarks if r.severity != "note"]
     apart = []

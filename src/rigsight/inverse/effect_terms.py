@@ -268,7 +268,9 @@ def _of_joint(
         except RigsightError:
             break
     # All points at once: a filter costs as much for one of them as for all.
-    filtered = [m.thinned(np.array(own)) for m, own in zip(fit.motions, zip(*rows, strict=True), strict=False)]
+    filtered = [
+        m.thinned(np.array(own)) for m, own in zip(fit.motions, zip(*rows, strict=True), strict=False)
+    ]
     names, most = tuple(p.name for p in linear), tuple(max(map(abs, p.search)) for p in linear)
     for inner, *columns in zip(tried, *filtered, strict=False):
         if all(np.all(np.isfinite(column)) for column in columns):

@@ -62,8 +62,6 @@ STYLE: dict[Any, Any] = {
 }
 
 FLOOR_LINE: dict[str, Any] = {"color": FLOOR, "linestyle": (0, (4, 2)), "linewidth": 1.2}
-TWO_SIDED = 1.96
-"""Standard deviations of a 95 % interval."""
 PAGE_WIDTH = 5.4
 """Of a figure in a page [inch]; on a phone, where it is scaled to the screen, letters stay readable."""
 _PREFIXES = {6: "M", 3: "k", 0: "", -3: "m", -6: "\u00b5", -9: "n"}

@@ -11,12 +11,12 @@ import numpy as np
 
 from rigsight.discover import JointForce
 from rigsight.discover.result import Discovery, Run, Term
+from rigsight.metrics import TWO_SIDED
 from rigsight.plot.drawing import (
     GIVEN,
     MEASURED,
     OTHER,
     PAGE_WIDTH,
-    TWO_SIDED,
     WITH_EFFECT,
     display_scale,
     line,

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from rigsight.frequency import FrequencyResponse
 from rigsight.frequency.signal_pair import ratio_unit
+from rigsight.metrics import TWO_SIDED
 from rigsight.plot.drawing import (
     FLOOR,
     MEASURED,
-    TWO_SIDED,
     WITH_EFFECT,
     new_figure,
     plain_log_ticks,

@@ -24,7 +24,7 @@ from rigsight.plot import (
 )
 from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.labels import column_label, error_text
-from rigsight.report.render import notebook_html, rendered
+from rigsight.report.page import notebook_html, rendered
 from rigsight.report.terminal import Summary, Writer, worth_knowing
 
 if TYPE_CHECKING:

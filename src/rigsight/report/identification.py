@@ -37,7 +37,7 @@ from rigsight.report.labels import (
     plain,
     written,
 )
-from rigsight.report.render import NotebookTable, notebook_html, rendered
+from rigsight.report.page import NotebookTable, notebook_html, rendered
 from rigsight.report.terminal import Summary, Writer, pairs, worth_knowing
 from rigsight.simulate.linearization import Linearization
 

@@ -5,16 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from rigsight.compare import Column
-from rigsight.compare.comparison import Quantity
-from rigsight.diagnose.result import Diagnosis, Estimate
-from rigsight.diagnose.verdict.families import FamilyAtPlace
 from rigsight.effects import AT, Effect, kind_of, placed
-from rigsight.inverse import ProposedCause
+from rigsight.metrics import TWO_SIDED
 from rigsight.parameters import Parameter
-from rigsight.plot.drawing import TWO_SIDED
 from rigsight.rigs import Rig, declared_rig
+
+if TYPE_CHECKING:
+    from rigsight.compare import Column
+    from rigsight.compare.comparison import Quantity
+    from rigsight.diagnose.location.paths import PathPart
+    from rigsight.diagnose.result import Diagnosis, Estimate
+    from rigsight.diagnose.verdict.families import FamilyAtPlace
+    from rigsight.inverse import ProposedCause
 
 TIMES = "\u00d7"
 _WITHOUT_EFFECT = "no effect, refitted parameters"
@@ -235,3 +239,9 @@ def effect_of(name: str, known: Mapping[str, Effect]) -> Effect | None:
     effect = known.get(kind_of(name))
     place = name.partition(AT)[2]
     return placed(effect, place) if effect is not None and place else effect
+
+
+def shift_text(part: PathPart) -> str:
+    """Return the delay with which a leg of the signal path follows best, and its gap then; empty where none was tested."""
+    delay = f"{1e3 * part.shift:.3g} ± {1e3 * part.shift_std:.1g} ms, then {gap_percent(part.shifted)}"
+    return delay.replace("-", "\u2212") if math.isfinite(part.shift) else ""

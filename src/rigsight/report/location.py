@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rigsight import plot
-from rigsight.diagnose.location.gap_parts import AmplitudePart, BandPart, GapPart, PathPart, StatePart
+from rigsight.diagnose.location.gap_parts import AmplitudePart, BandPart, GapPart, StatePart
 from rigsight.diagnose.result import Diagnosis
 from rigsight.records.stamps import written_span
 from rigsight.report.figures import PageFigure, page_figure
@@ -29,12 +29,6 @@ class OutputMaps:
     key: str
     title: str
     figures: list[PageFigure]
-
-
-def shift_text(part: PathPart) -> str:
-    """Return the delay with which a leg of the signal path follows best, and its gap then; empty where none was tested."""
-    delay = f"{1e3 * part.shift:.3g} ± {1e3 * part.shift_std:.1g} ms, then {gap_percent(part.shifted)}"
-    return delay.replace("-", "\u2212") if math.isfinite(part.shift) else ""
 
 
 def all_maps(diagnosis: Diagnosis) -> list[OutputMaps]:

@@ -23,8 +23,7 @@ from rigsight.diagnose.result import Diagnosis
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.transfer.record_response import Method
-from rigsight.metrics import nrmse
-from rigsight.plot.drawing import TWO_SIDED
+from rigsight.metrics import TWO_SIDED, nrmse
 from rigsight.plot.frequency_responses import decibel, thinned
 from rigsight.records import Record
 from rigsight.records.record import Floats, Hold, Kind

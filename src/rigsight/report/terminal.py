@@ -16,7 +16,7 @@ from rigsight.discover import Discovery
 from rigsight.discover.result import Term
 from rigsight.report import labels, wording
 from rigsight.report.labels import estimate_text, gap_percent
-from rigsight.report.render import notebook_html
+from rigsight.report.page import notebook_html
 from rigsight.report.sections import trust_line
 
 _RANKED = 3

@@ -9,7 +9,7 @@ from rigsight.campaign import Campaign
 from rigsight.check import Check, check_campaign
 from rigsight.check.campaign_check import PARTS
 from rigsight.effects import CATALOGUE, Effect
-from rigsight.report.check_and_plan import render_check
+from rigsight.report.check import render_check
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.in_memory import campaign_of_rig, is_rig_file
 from rigsight.workflow.campaign.read_campaign import read_campaign

@@ -20,7 +20,7 @@ from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.fit.windows import cut, window_length
 from rigsight.identify.transfer.record_response import METHODS, Method
 from rigsight.plot import svg_text
-from rigsight.report import comparison_figures, render_comparison
+from rigsight.report.comparison import comparison_figures, render_comparison
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.simulate.equilibrium import can_drift

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import lfilter
 
-from rigsight.diagnose import Diagnosis
+from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.excitation import log_sweep, step
 from rigsight.records import Hold, Kind, Record, Role

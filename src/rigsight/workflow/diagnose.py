@@ -19,9 +19,11 @@ from typing import Any, Self
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import Diagnosis, diagnose, structures_to_fit
+from rigsight.diagnose.diagnosis import diagnose
+from rigsight.diagnose.fit_context import structures_to_fit
+from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import CATALOGUE, Effect
-from rigsight.report import render_report
+from rigsight.report.render import render_report
 from rigsight.rigs import Rig
 from rigsight.simulate import cache_folder
 from rigsight.workflow.campaign.model_file import MODEL_FILE

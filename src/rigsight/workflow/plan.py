@@ -16,7 +16,7 @@ from rigsight.effects import AT, CATALOGUE, Effect
 from rigsight.errors import InputError
 from rigsight.plan import Named, Plan, Sizes, plan_experiment, read_limits, read_payloads, use_of
 from rigsight.plot import planned_experiment, png_bytes, svg_text
-from rigsight.report.check_and_plan import render_plan
+from rigsight.report.plan import render_plan
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.in_memory import campaign_of_rig, is_rig_file
 from rigsight.workflow.campaign.model_file import json_object

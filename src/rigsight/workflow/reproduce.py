@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import Diagnosis
+from rigsight.diagnose.result import Diagnosis
 from rigsight.errors import InputError
 from rigsight.json_data import json_data
 from rigsight.records import Record

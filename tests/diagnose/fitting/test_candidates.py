@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rigsight.diagnose import candidates_on
+from rigsight.diagnose.fit_context import candidates_on
 from rigsight.effects import CATALOGUE, effect_named, placed
 from rigsight.rigs import AXIS, RIGS
 

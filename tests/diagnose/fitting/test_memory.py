@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import Diagnosis, diagnose
+from rigsight.diagnose.diagnosis import diagnose
+from rigsight.diagnose.result import Diagnosis
 from rigsight.diagnose.search.starts import restart_values
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep

@@ -10,8 +10,8 @@ import pytest
 from scipy.signal import lfilter
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import diagnose, structures_to_fit
-from rigsight.diagnose.fit_context import start_values_of
+from rigsight.diagnose.diagnosis import diagnose
+from rigsight.diagnose.fit_context import start_values_of, structures_to_fit
 from rigsight.diagnose.search.horizon import windowing_of
 from rigsight.effects import CATALOGUE, effect_named, placed
 from rigsight.identify import GreyBoxFit, characteristic_scales

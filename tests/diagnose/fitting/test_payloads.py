@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import Diagnosis, diagnose
+from rigsight.diagnose.diagnosis import diagnose
+from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import effect_named
 from rigsight.records import Record
 from rigsight.records.record import Role

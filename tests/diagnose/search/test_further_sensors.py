@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import candidates_on, diagnose
+from rigsight.diagnose.diagnosis import diagnose
+from rigsight.diagnose.fit_context import candidates_on
 from rigsight.effects import CATALOGUE, effect_named, placed
 from rigsight.inverse import propose
 from rigsight.records import Record

@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import candidates_on
-from rigsight.diagnose.fit_context import FitContext, FittedModel, fit_context_of, start_values_of
+from rigsight.diagnose.fit_context import (
+    FitContext,
+    FittedModel,
+    candidates_on,
+    fit_context_of,
+    start_values_of,
+)
 from rigsight.diagnose.search.fitted_models import held_by_motion
 from rigsight.diagnose.search.single_effects import fit_candidate, reidentify
 from rigsight.effects import CATALOGUE, effect_named

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigsight.diagnose import candidates_on
-from rigsight.diagnose.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel, candidates_on
 from rigsight.diagnose.search.nested_models import (
     at_least_as_good,
     lowered_by_extensions,

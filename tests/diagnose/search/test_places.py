@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import candidates_on, diagnose
-from rigsight.diagnose.fit_context import FitContext
+from rigsight.diagnose.diagnosis import diagnose
+from rigsight.diagnose.fit_context import FitContext, candidates_on
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.diagnose.search.worth_fitting import Search, search_places
 from rigsight.effects import Effect, effect_named, placed

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import Diagnosis, diagnose
+from rigsight.diagnose.diagnosis import diagnose
 from rigsight.diagnose.fit_context import FitContext
+from rigsight.diagnose.result import Diagnosis
 from rigsight.diagnose.search.screening import Shortlist
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.diagnose.search.worth_fitting import Search, search_places

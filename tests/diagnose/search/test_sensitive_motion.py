@@ -9,7 +9,8 @@ import pytest
 from scipy.signal import lfilter
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import Diagnosis, diagnose
+from rigsight.diagnose.diagnosis import diagnose
+from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import Effect, effect_named
 from rigsight.excitation import log_sweep
 from rigsight.records import Record

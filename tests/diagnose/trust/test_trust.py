@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from scipy.stats import kstest
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import diagnose
+from rigsight.diagnose.diagnosis import diagnose
 from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.trust.patterns import Pattern, Role, meaning

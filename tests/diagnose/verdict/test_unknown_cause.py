@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import diagnose
+from rigsight.diagnose.diagnosis import diagnose
 from rigsight.diagnose.verdict.judgement import traced_to
 from rigsight.effects import effect_named, placed
 from rigsight.identify.fit.windows import liveliest

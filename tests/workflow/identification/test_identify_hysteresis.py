@@ -19,8 +19,7 @@ from rigsight.errors import InputError
 from rigsight.excitation import log_sweep
 from rigsight.identify.identification import Identification
 from rigsight.records import Record, Role
-from rigsight.report import identification_summary
-from rigsight.report.identification import identification_html
+from rigsight.report.identification import identification_html, identification_summary
 from rigsight.rigs import AXIS, rig_file_text
 from rigsight.rigs.reading.rig_file import rig_of_tables
 from rigsight.simulate.model import Model

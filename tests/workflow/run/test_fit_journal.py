@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rigsight.diagnose import Diagnosis
+from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import effect_named
 from rigsight.errors import MachineError
 from rigsight.workflow.diagnose import FitJournal, run_diagnose

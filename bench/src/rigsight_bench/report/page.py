@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
-from rigsight.report.render import environment
+from rigsight.report.page import environment
 from rigsight_bench.report import conditions, views
 from rigsight_bench.report.confusion import confusion, rows_of_several
 from rigsight_bench.report.figures import held_out_figure, reliability_figure

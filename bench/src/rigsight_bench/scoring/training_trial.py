@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, cast
 
-from rigsight.diagnose import Situation, Verdict
+from rigsight.diagnose.verdict.calibration import Situation
+from rigsight.diagnose.verdict.judgement import Verdict
 from rigsight_bench.scoring.score import BY_PLACE_SCHEMA, effects_at_places, needed_effects
 
 Cause = Literal["first", "listed", "outside"]

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import candidates_on
+from rigsight.diagnose.fit_context import candidates_on
 from rigsight.discover.terms import known_terms
 from rigsight.effects import AT, CATALOGUE, Effect, effect_named, kind_of, placed
 from rigsight.effects.effect import PARTS

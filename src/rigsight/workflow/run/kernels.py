@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 
 from joblib import Parallel, delayed
 
-from rigsight.diagnose import candidates_on, structures_of_shortlist
+from rigsight.diagnose.fit_context import candidates_on
+from rigsight.diagnose.search.screening import structures_of_shortlist
 from rigsight.effects import Effect
 from rigsight.errors import check_in_range
 from rigsight.rigs import Rig

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from rigsight.diagnose import candidates_on
+from rigsight.diagnose.fit_context import candidates_on
 from rigsight.effects import CATALOGUE, Effect, kind_of
 from rigsight.identify.typical_size import typical_size
 from rigsight.records import Hold, Record

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from rigsight.diagnose import candidates_on
+from rigsight.diagnose.fit_context import candidates_on
 from rigsight.effects import CATALOGUE, kind_of
 from rigsight.rigs import RIGS
 from rigsight_bench.trials.counted import COUNTED_EFFECTS

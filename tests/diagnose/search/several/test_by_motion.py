@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import diagnose
+from rigsight.diagnose.diagnosis import diagnose
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.records import Record
 from rigsight.rigs import RIGS

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import diagnose
+from rigsight.diagnose.diagnosis import diagnose
 from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search import stepwise

@@ -11,7 +11,7 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
-from rigsight.diagnose import candidates_on
+from rigsight.diagnose.fit_context import candidates_on
 from rigsight.effects import Effect, Place, kind_of
 from rigsight.rigs import joint_of
 from rigsight_bench.trials.counted import counted_effects

@@ -1,21 +1,14 @@
-"""What the records of a campaign can show, and a planned experiment, each as one self-contained HTML page without a script."""
+"""What the records of a campaign can show as one self-contained HTML page without a script."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from rigsight.check import Check, EffectMatrix, Told, Visible
 from rigsight.effects import kind_of
-from rigsight.plan import Plan, Sizes
-from rigsight.report.figures import page_figure
-from rigsight.report.labels import effect_label, listed, percent, place_label
-from rigsight.report.render import rendered
-from rigsight.units import INPUT_UNIT
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from rigsight.report.labels import effect_label, listed, place_label
+from rigsight.report.page import rendered
 
 TOLD_WORDS: Mapping[Told, str] = {
     "apart": "told apart by these records",
@@ -112,62 +105,3 @@ def short_label(matrix: EffectMatrix, i: int) -> str:
 
 def _count(n: int, what: str) -> str:
     return f"{n} {what}{'' if n == 1 else 's'}"
-
-
-_SIZES: Mapping[Sizes, str] = {
-    "fitted": "Each rival was fitted to the records.",
-    "usual": "No verdict named the rivals: they have a usual size. Each was fitted to the records as they would be if another "
-    "one were true.",
-    "usual, no records": "There are no records yet: the rivals have a usual size, the rig the numbers of its file.",
-}
-_GAIN = 0.05
-"""Gain of probability below which an experiment is not worth its time (a convention)."""
-
-
-def render_plan(plan: Plan, picture: Figure, command: str, versions: Mapping[str, str], seed: int) -> str:
-    """Return the page of a plan."""
-    record = plan.record
-    shown = {name: "" if unit == INPUT_UNIT else unit for name, unit in record.units.items()}
-    units = {}
-    for limit, _ in plan.limits:
-        unit = shown.get(limit.signal, "")
-        units[limit.name] = f"{unit or '1'}/s" if limit.is_rate else unit
-    return rendered(
-        "plan.html.jinja",
-        command or "from Python",
-        versions,
-        seed,
-        plan=plan,
-        headline=plan_headline(plan),
-        instructions=[
-            f"plan.csv holds the time and every input at {1.0 / record.dt:.5g} Hz, in SI units.",
-            "Measure every sensor meanwhile, and list the record in the campaign.",
-        ],
-        picture=page_figure(
-            picture,
-            "plan",
-            plan_headline(plan),
-            "The inputs, the readings that each rival predicts, and what is left of them.",
-        ),
-        units=units,
-        sizes=_SIZES[plan.sizes],
-        promise=promise(plan),
-    )
-
-
-def plan_headline(plan: Plan) -> str:
-    """Return what to play in a sentence."""
-    constants = ", ".join(f"{name} = {value:g}" for name, value in plan.record.constants.items())
-    return f"Play: {plan.what}, {plan.record.duration:g} s{f', with {constants}' if constants else ''}."
-
-
-def promise(plan: Plan) -> str:
-    """Return what to expect afterwards."""
-    trials = plan.trials
-    gains = plan.promised > plan.now + _GAIN
-    return (
-        f"{'' if gains else 'No record within these limits tells these rivals apart. '}"
-        f"Expected probability of the cause afterwards: {plan.promised:.2f}, now {plan.now:.2f}. "
-        f"In {trials.n} simulated outcomes the cause was the most probable in {percent(trials.right)}, "
-        f"decided in {percent(trials.decided)}, wrongly in {percent(trials.wrong)}."
-    )

@@ -1,0 +1,73 @@
+"""A planned experiment as one self-contained HTML page without a script."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from rigsight.plan import Plan, Sizes
+from rigsight.report.figures import page_figure
+from rigsight.report.labels import percent
+from rigsight.report.page import rendered
+from rigsight.units import INPUT_UNIT
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_SIZES: Mapping[Sizes, str] = {
+    "fitted": "Each rival was fitted to the records.",
+    "usual": "No verdict named the rivals: they have a usual size. Each was fitted to the records as they would be if another "
+    "one were true.",
+    "usual, no records": "There are no records yet: the rivals have a usual size, the rig the numbers of its file.",
+}
+_GAIN = 0.05
+"""Gain of probability below which an experiment is not worth its time (a convention)."""
+
+
+def render_plan(plan: Plan, picture: Figure, command: str, versions: Mapping[str, str], seed: int) -> str:
+    """Return the page of a plan."""
+    record = plan.record
+    shown = {name: "" if unit == INPUT_UNIT else unit for name, unit in record.units.items()}
+    units = {}
+    for limit, _ in plan.limits:
+        unit = shown.get(limit.signal, "")
+        units[limit.name] = f"{unit or '1'}/s" if limit.is_rate else unit
+    return rendered(
+        "plan.html.jinja",
+        command or "from Python",
+        versions,
+        seed,
+        plan=plan,
+        headline=plan_headline(plan),
+        instructions=[
+            f"plan.csv holds the time and every input at {1.0 / record.dt:.5g} Hz, in SI units.",
+            "Measure every sensor meanwhile, and list the record in the campaign.",
+        ],
+        picture=page_figure(
+            picture,
+            "plan",
+            plan_headline(plan),
+            "The inputs, the readings that each rival predicts, and what is left of them.",
+        ),
+        units=units,
+        sizes=_SIZES[plan.sizes],
+        promise=promise(plan),
+    )
+
+
+def plan_headline(plan: Plan) -> str:
+    """Return what to play in a sentence."""
+    constants = ", ".join(f"{name} = {value:g}" for name, value in plan.record.constants.items())
+    return f"Play: {plan.what}, {plan.record.duration:g} s{f', with {constants}' if constants else ''}."
+
+
+def promise(plan: Plan) -> str:
+    """Return what to expect afterwards."""
+    trials = plan.trials
+    gains = plan.promised > plan.now + _GAIN
+    return (
+        f"{'' if gains else 'No record within these limits tells these rivals apart. '}"
+        f"Expected probability of the cause afterwards: {plan.promised:.2f}, now {plan.now:.2f}. "
+        f"In {trials.n} simulated outcomes the cause was the most probable in {percent(trials.right)}, "
+        f"decided in {percent(trials.decided)}, wrongly in {percent(trials.wrong)}."
+    )
