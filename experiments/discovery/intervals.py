@@ -19,7 +19,9 @@ from rich.table import Table
 from scipy.signal import lfilter
 
 from rigsight.campaign import Campaign
-from rigsight.discover import DiscoveryData, discover, known_terms
+from rigsight.discover.discovery import discover
+from rigsight.discover.records import DiscoveryData
+from rigsight.discover.terms import known_terms
 from rigsight.excitation import log_sweep, multisine, multisine_lines
 from rigsight.records import Record
 from rigsight.rigs import AXIS

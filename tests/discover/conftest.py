@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.discover import DiscoveryData, known_terms
+from rigsight.discover.records import DiscoveryData
+from rigsight.discover.terms import known_terms
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RIGS, Rig
 from rigsight.simulate import compose, simulate

@@ -11,10 +11,10 @@ import pytest
 import sympy as sp
 
 from rigsight.campaign import Campaign
-from rigsight.discover import DiscoveryData, discover, known_terms
 from rigsight.discover.along_motion import AlongMotion
-from rigsight.discover.discovery import check_predicts
-from rigsight.discover.terms import offered_terms
+from rigsight.discover.discovery import check_predicts, discover
+from rigsight.discover.records import DiscoveryData
+from rigsight.discover.terms import known_terms, offered_terms
 from rigsight.effects import Effect, kind_of, placed
 from rigsight.effects.effect import Energy, GainTrend, Place, Signature
 from rigsight.effects.symbols import x

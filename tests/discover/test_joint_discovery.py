@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.discover import Discovery, DiscoveryData, discover
+from rigsight.discover.discovery import discover
+from rigsight.discover.records import DiscoveryData
+from rigsight.discover.result import Discovery
 from rigsight.effects import effect_named, kind_of, placed
 from rigsight.plot import svg_text
 from rigsight.plot.fitted_numbers import discovery_figure

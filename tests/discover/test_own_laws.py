@@ -9,11 +9,11 @@ import pytest
 import sympy as sp
 
 from rigsight.campaign import Campaign
-from rigsight.discover import known_terms
 from rigsight.discover.along_motion import AlongMotion
 from rigsight.discover.bench import Attempt, Bench, Trial
 from rigsight.discover.own_laws import offered_shape, own_laws
 from rigsight.discover.result import OfferedShape
+from rigsight.discover.terms import known_terms
 from rigsight.effects import Effect, Energy, GainTrend, Place, Signature, placed
 from rigsight.effects.symbols import sigmoid, x
 from rigsight.excitation import linear_sweep

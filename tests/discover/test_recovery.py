@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.discover import Discovery, DiscoveryData, discover
 from rigsight.discover.bench import Bench, Trial
+from rigsight.discover.discovery import discover
+from rigsight.discover.records import DiscoveryData
+from rigsight.discover.result import Discovery
 from rigsight.discover.selection import Selection, select
 from rigsight.effects import effect_named
 from rigsight.errors import SimulationError

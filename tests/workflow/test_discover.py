@@ -14,10 +14,11 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.cli import app
-from rigsight.discover import MONOMIALS, Discovery, DiscoveryData, JointForce
 from rigsight.discover.own_laws import own_laws
-from rigsight.discover.result import OfferedShape, Run
+from rigsight.discover.records import DiscoveryData
+from rigsight.discover.result import Discovery, JointForce, OfferedShape, Run
 from rigsight.discover.shape import Shape
+from rigsight.discover.terms import MONOMIALS
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.identify.fit.windows import cut

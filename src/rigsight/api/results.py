@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, get_args
 
 from rigsight.diagnose.location.trace import STAGES
 from rigsight.diagnose.result import Diagnosis
-from rigsight.discover import Discovery
+from rigsight.discover.result import Discovery
 from rigsight.effects import Effect
 from rigsight.errors import InputError, check_option
 from rigsight.identify.identification import Identification

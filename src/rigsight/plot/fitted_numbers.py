@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigsight.discover import JointForce
-from rigsight.discover.result import Discovery, Run, Term
+from rigsight.discover.result import Discovery, JointForce, Run, Term
 from rigsight.metrics import TWO_SIDED
 from rigsight.plot.drawing import (
     GIVEN,

@@ -12,8 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rigsight.diagnose.result import Candidate, Diagnosis, Estimate
-from rigsight.discover import Discovery
-from rigsight.discover.result import Term
+from rigsight.discover.result import Discovery, Term
 from rigsight.report import labels, wording
 from rigsight.report.labels import estimate_text, gap_percent
 from rigsight.report.page import notebook_html

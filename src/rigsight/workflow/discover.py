@@ -11,8 +11,9 @@ from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.noise.detection import noise_floors
-from rigsight.discover import Discovery, DiscoveryData, discover
-from rigsight.discover.result import LAWS_FILE, SHAPE_FILE
+from rigsight.discover.discovery import discover
+from rigsight.discover.records import DiscoveryData
+from rigsight.discover.result import LAWS_FILE, SHAPE_FILE, Discovery
 from rigsight.effects import Effect
 from rigsight.errors import InputError, RigsightError
 from rigsight.identify.closed_loop import closed_loop_notes

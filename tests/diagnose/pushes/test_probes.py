@@ -13,7 +13,7 @@ from rigsight.diagnose.pushes.probes import (
     signal_columns,
     with_probes,
 )
-from rigsight.discover import known_terms
+from rigsight.discover.terms import known_terms
 from rigsight.effects import effect_named, placed
 from rigsight.records.record import Record
 from rigsight.rigs import RIGS

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from rigsight.discover import MONOMIALS
+from rigsight.discover.terms import MONOMIALS
 from rigsight.effects import Effect, Energy, GainTrend, Place, Signature, Start, State, SumAndDifference
 from rigsight.effects.symbols import u, v, x
 from rigsight.parameters import Parameter

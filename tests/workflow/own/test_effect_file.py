@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from rigsight.discover import known_terms
 from rigsight.discover.own_laws import own_laws
 from rigsight.discover.shape import Shape
+from rigsight.discover.terms import known_terms
 from rigsight.effects import Effect
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose
