@@ -22,7 +22,6 @@ NAME_A_RIG = {
     "workflow/campaign/in_memory.py": "the records of the ten lines of the README come from a virtual axis",
     "identify/hysteresis/derived.py": "a loop of hysteresis alone is the built-in element with one spring",
     "identify/transfer/conicity.py": "API: equation (2.12) of the thesis, of the running gear",
-    "rigs/__init__.py": "the built-in rigs",
     "rigs/built_in.py": "the built-in rigs",
     "workflow/demo.py": "the demo is the running gear of the thesis",
     "workflow/own/effect_checks.py": "effects of one's own are tried on three built-in rigs",

@@ -261,7 +261,9 @@ def _of_joint(
     nothing = dict.fromkeys((p.name for p in linear), 0.0)
     tried, rows = list(grid_of(effect, linear, scales) if points is None else points), []
     for inner in tried:
-        own = [{**inner, **nothing, p.name: unit} for p, unit in zip(linear, units, strict=True)] or [inner]
+        own = [{**inner, **nothing, p.name: unit} for p, unit in zip(linear, units, strict=True)] or [
+            dict(inner)
+        ]
         along = list(zip(fit.motions, moved, strict=True))
         try:
             rows.append([[generalized(m, effect, o, values, joint) for o in own] for m, joint in along])

@@ -15,7 +15,7 @@ from rigsight.rigs import Rig, declared_rig
 if TYPE_CHECKING:
     from rigsight.compare import Column
     from rigsight.compare.comparison import Quantity
-    from rigsight.diagnose.location.paths import PathPart
+    from rigsight.diagnose.location.gap_parts import PathPart
     from rigsight.diagnose.result import Diagnosis, Estimate
     from rigsight.diagnose.verdict.families import FamilyAtPlace
     from rigsight.inverse import ProposedCause

@@ -1,10 +1,8 @@
 """Rigs as declarations: signals, parameters, equations, and the places where effects can act."""
 
-from rigsight.rigs.built_in import AXIS as AXIS
-from rigsight.rigs.built_in import ELEMENT as ELEMENT
 from rigsight.rigs.built_in import RIGS as RIGS
-from rigsight.rigs.built_in import RUNNING_GEAR as RUNNING_GEAR
 from rigsight.rigs.built_in import KnownRigs as KnownRigs
+from rigsight.rigs.built_in import __getattr__ as __getattr__
 from rigsight.rigs.built_in import declared_rig as declared_rig
 from rigsight.rigs.built_in import rig_file_text as rig_file_text
 from rigsight.rigs.built_in import rotational as rotational

@@ -89,13 +89,18 @@ def _rig(name: str) -> Rig:
     return rig_of_text(rig_file_text(name), f"{name}.toml", check_units=False)
 
 
-AXIS = RIGS["axis"]
-"""One moving mass with a drive."""
-ELEMENT = RIGS["element"]
-"""A force element on a bench that prescribes the motion."""
-RUNNING_GEAR = RIGS["running_gear"]
-"""The running gear of the thesis."""
+_NAMED = {"AXIS": "axis", "ELEMENT": "element", "RUNNING_GEAR": "running_gear"}
+"""Constants of this package: one moving mass with a drive, a force element on a bench, the running gear of the thesis."""
 
+
+def __getattr__(name: str) -> Rig:
+    """Return a rig by its constant; to read all of them at once would delay every command."""
+    if name in _NAMED:
+        return RIGS[_NAMED[name]]
+    raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+
+
+_TURNED = ("axis", "element")
 
 _TURNING = {"m": "rad", "N": "N m", "kg": "kg m^2"}
 """Units of a motion along a line -> those of one about an axis."""
@@ -103,7 +108,7 @@ _TURNING = {"m": "rad", "N": "N m", "kg": "kg m^2"}
 
 def rotational(rig: Rig) -> Rig | None:
     """Return `AXIS` or `ELEMENT` with an angle for its displacement and a torque for its force; None for any other rig."""
-    return _rotational(rig.name) if rig is AXIS or rig is ELEMENT else None
+    return _rotational(rig.name) if rig.name in _TURNED and rig is RIGS[rig.name] else None
 
 
 @cache

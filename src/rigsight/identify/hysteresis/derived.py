@@ -18,7 +18,7 @@ from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.covariance import symmetric_eigen
 from rigsight.identify.fit.fit_data import FitResult
 from rigsight.records.record import Floats, Record
-from rigsight.rigs import ELEMENT
+from rigsight.rigs import built_in
 from rigsight.simulate import Structure, compose, simulate_sets
 from rigsight.simulate.input_hold import hold_motion
 
@@ -167,7 +167,7 @@ def loop_area(structure: Structure, p: Floats, amplitude: float) -> Floats:
         )
     if not 0.0 < amplitude < np.inf:
         raise InputError(f"The amplitude of a loop must be positive, got {amplitude:g}.")
-    bench = compose(ELEMENT, effects)
+    bench = compose(built_in.ELEMENT, effects)
     known = dict(structure.fixed)
     values = np.zeros((len(bench.names), p.shape[1]))
     stiffness = structure.rig.motion.stiffness

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import sympy as sp
 from scipy.optimize import brentq
@@ -19,12 +20,7 @@ from scipy.stats import norm
 from rigsight.effects.symbols import derivative
 from rigsight.errors import InputError
 from rigsight.identify.fit.covariance import LEVEL
-from rigsight.rigs import evaluated
-from rigsight.rigs.built_in import RUNNING_GEAR
-
-(_CREEP_FACTOR,) = (a.value for a in RUNNING_GEAR.alternatives if a.parameter.name == "delta_0")
-_SLOPE = derivative(_CREEP_FACTOR, sp.Symbol("delta_0", real=True))
-
+from rigsight.rigs import built_in, evaluated
 
 PLAUSIBLE = 0.3
 """Largest plausible conicity of profiled wheels [rad]; an interval that covers the whole range determines nothing. A choice, far
@@ -123,9 +119,16 @@ def _root(c_y: float, lowest: float, largest: float, r_0: float, b: float) -> fl
 
 def creep_factor(delta_0: float, r_0: float, b: float) -> float:
     """Return c_y of (2.12) for the equivalent conicity `delta_0` [rad], wheel radius and track width [m]."""
-    return evaluated(_CREEP_FACTOR, {"delta_0": delta_0, "r_0": r_0, "b": b})
+    return evaluated(_creep_factor(), {"delta_0": delta_0, "r_0": r_0, "b": b})
 
 
 def conicity_slope(delta_0: float, r_0: float, b: float) -> float:
     """Return dc_y / d delta_0 [1/rad] of (2.12)."""
-    return evaluated(_SLOPE, {"delta_0": delta_0, "r_0": r_0, "b": b})
+    slope = derivative(_creep_factor(), sp.Symbol("delta_0", real=True))
+    return evaluated(slope, {"delta_0": delta_0, "r_0": r_0, "b": b})
+
+
+@cache
+def _creep_factor() -> sp.Expr:
+    (found,) = (a.value for a in built_in.RUNNING_GEAR.alternatives if a.parameter.name == "delta_0")
+    return found

@@ -13,13 +13,11 @@ from pathlib import Path
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.fit_context import candidates_on
-from rigsight.discover.terms import known_terms
 from rigsight.effects import AT, CATALOGUE, Effect, effect_named, kind_of, placed
 from rigsight.effects.effect import PARTS
 from rigsight.errors import InputError, nearest
 from rigsight.rigs import Rig
 from rigsight.simulate.printing.notation import text
-from rigsight.workflow.own.effect_checks import failed_checks
 from rigsight.workflow.own.effect_declaration import declaration_faults
 from rigsight.workflow.own.own_rigs import run_python_file
 from rigsight.workflow.run.progress import Listener, Stage, silent
@@ -53,10 +51,17 @@ def own_effects(
     InputError
         Naming file and line, if a file cannot be run, declares no effect or a name twice, or an effect fails a check.
     """
+    distinct = {Path(file).resolve(): Path(file) for file in files}.values()
+    listed = [*_installed(), *(own for path in distinct for own in _loaded(path))]
+    if not listed:
+        return ()
+    # Not above: without effects of one's own, benches that check them would be loaded for nothing.
+    from rigsight.discover.terms import known_terms
+    from rigsight.workflow.own.effect_checks import failed_checks
+
     found: list[_Declared] = []
     taken = {effect.name: "the catalogue" for effect in known_terms().values()}
-    distinct = {Path(file).resolve(): Path(file) for file in files}.values()
-    for effect, declared in (*_installed(), *(own for path in distinct for own in _loaded(path))):
+    for effect, declared in listed:
         if any(effect is other for other, _ in found):
             continue
         _refuse(effect, declared, declaration_faults(effect))
@@ -66,8 +71,6 @@ def own_effects(
             )
         taken[effect.name] = declared
         found.append((effect, declared))
-    if not found:
-        return ()
     stage = Stage(CHECKING, len(found), listener)
     for effect, declared in found:
         for parent in effect.parents:
