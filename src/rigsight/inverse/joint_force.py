@@ -155,7 +155,9 @@ def effect_force(effect: Effect, values: Mapping[str, float], motion: JointMotio
     # A drive that overcomes friction loads the joint with it.
     force = np.zeros_like(motion.load)
     for _ in range(_ROUNDS):
-        force = _along(effect.torque, values, motion, force)
+        before, force = force, _along(effect.torque, values, motion, force)
+        if np.array_equal(before, force):
+            break
     return force
 
 

@@ -276,6 +276,8 @@ def _quiet_stretches(record: Record, sources: Sequence[str], output: str) -> lis
     edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(np.int8), [0]])))
     found = []
     for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        if end - begin < NOTES.least_rest:
+            continue
         moved = np.maximum(NOTES.quiet_input * span, 2.0 * NOTES.quiet_deviations * noise)
         start, stop = (begin + place for place in _held(samples[begin : end + 1], moved))
         if stop - start < NOTES.least_rest:
