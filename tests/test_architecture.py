@@ -130,6 +130,8 @@ def test_no_other_module_knows_a_rig_by_name() -> None:
     def names_one(node: ast.AST) -> bool:
         if isinstance(node, ast.ImportFrom):
             return any(alias.name in constants for alias in node.names)
+        if isinstance(node, ast.Attribute):
+            return node.attr in constants
         return isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value in RIGS
 
     found = {

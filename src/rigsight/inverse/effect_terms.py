@@ -274,7 +274,7 @@ def _of_joint(
         m.thinned(np.array(own)) for m, own in zip(fit.motions, zip(*rows, strict=True), strict=False)
     ]
     names, most = tuple(p.name for p in linear), tuple(max(map(abs, p.search)) for p in linear)
-    for inner, *columns in zip(tried, *filtered, strict=False):
+    for inner, *columns in zip(tried[: len(rows)], *filtered, strict=True):
         if all(np.all(np.isfinite(column)) for column in columns):
             yield Term(effect, inner, names, tuple(units), tuple(columns), one_sided, most)
 
