@@ -7,7 +7,8 @@ Equation
 k_g: weight times distance of the center of mass from the axis; the effect vanishes at 0. k stays the whole stiffness at rest.
 
 Applies to anything that hangs (or, with negative k_g, stands) and turns through large angles [rad]. At small angles it cannot
-be told from a softening cubic spring with k_3 = -k_g / 6.
+be told from a softening cubic spring with k_3 = -k_g / 6. Weights of more than ten times the whole stiffness are not searched:
+weight and spring would have to cancel to a tenth, which makes every hardening spring a weight that stands.
 
 Signature: softer at large amplitude; odd harmonics; no losses.
 
@@ -34,8 +35,8 @@ GRAVITY_PENDULUM = Effect(
             "force x^-1",
             lower=-1e12,
             upper=1e12,
-            starts=(1.0, 20.0),
-            search=(-1e3, 1e3),
+            starts=(1.0,),
+            search=(-10.0, 10.0),
         ),
     ),
     energy=Energy.CONSERVATIVE,
@@ -44,6 +45,6 @@ GRAVITY_PENDULUM = Effect(
     starts=(
         Start({"k_g": -6 * k_3}, parent="cubic_stiffness"),
         Start({"k_g": k}),
-        Start({"k_g": 20 * k}),
+        Start({"k_g": -k}),
     ),
 )

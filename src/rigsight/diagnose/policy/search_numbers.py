@@ -149,26 +149,13 @@ class SearchNumbers:
         4,
         "Additional integration steps of a first fit relative to its parent: enough for a lag of a fifth of a sample.",
     )
-    beam: float = budget(
-        1.3,
-        "A second effect is added to singles whose held-out error is within this factor of the best: to the simplest, and to "
-        "the best that differs from it.",
+    alike_pairs: float = budget(
+        1.01, "Factor within which the errors of a single effect and of a pair count as equal."
     )
-    alike_pairs: float = budget(1.01, "Pairs within this factor of the best are also fitted to convergence.")
-    most_finished: int = budget(2, "Number of pairs, and of triples, that are fitted to convergence.")
     most_refitted: int = budget(2, "Number of pairs whose effects are fitted alone again.")
-    most_swaps: int = budget(
-        2,
-        "Number of times that an effect of the best pair is replaced by a more general or similar one: once for each of the two.",
-    )
     most_effects: int = convention(
         3,
         "Number of effects up to which the search adds one at a time; sets that are selected along the motion may be larger.",
-    )
-    finest_steps: int = budget(
-        4,
-        "Integration steps per sample up to which a second effect is added to a model other than the simplest: pairs with a "
-        "much stiffer model would need equally small steps.",
     )
     most_windowed_pairs: int = budget(
         3, "Number of pairs that are fitted in windows: those with the lowest error on the whole records."
@@ -242,5 +229,5 @@ class SearchNumbers:
     )
     most_unnamed: int = budget(
         2,
-        "Number of causes that the motion does not name, such as delays, that are added to those that it names.",
+        "Number of causes that are added to those that the motion names, such as delays, or to a single one.",
     )

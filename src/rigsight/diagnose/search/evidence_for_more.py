@@ -128,7 +128,7 @@ def _read(effect: Effect) -> set[str]:
 
 
 class OtherForms:
-    """Part of the residual of single effects that other forms of them would explain, computed once for each."""
+    """How much of the residual of a model other forms of its effects would explain, computed once for each."""
 
     # If the noise floor is only a lower bound, no part of a residual can be attributed to noise beforehand.
 
@@ -149,19 +149,6 @@ class OtherForms:
             gains = [float(np.sum((form.T @ responses.remainder) ** 2)) for form in forms]
             self._known[key] = max(gains) / responses.n_measured
         return self._known[key]
-
-    def share(self, model: FittedModel) -> float:
-        """Return the share of the squared residual above the noise that another form of one effect explains."""
-        above_noise = max(model.error_over_noise**2 - self._noise, 0.0)
-        return min(1.0, self.gain(model) / above_noise) if above_noise > 0.0 else 1.0
-
-    def partners(self, single: FittedModel, effects: Sequence[Effect]) -> list[Effect]:
-        """Return the effects that are worth trying beside a single one."""
-        # If another form of it would explain most of its residual, only effects that act as one law with it. Beside an effect
-        # with memory, another law without memory is no other form: it is tried, and must explain the records.
-        if any(effect.states for effect in single.effects) or self.share(single) < VERDICT.larger_part:
-            return list(effects)
-        return [e for e in effects if are_one_law((*single.effects, e), self._context.rig)]
 
     def with_own_evidence(
         self, singles: Sequence[FittedModel], larger: Sequence[FittedModel]

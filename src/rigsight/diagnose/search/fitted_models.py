@@ -16,13 +16,13 @@ from rigsight.diagnose.search.evidence_for_more import OtherForms
 from rigsight.diagnose.search.horizon import fitted_in_windows, is_predictable, pairs_in_windows
 from rigsight.diagnose.search.nested_models import lowered_by_extensions, ordered_by_inclusion
 from rigsight.diagnose.search.one_more_effect import part_of, with_causes
-from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
-from rigsight.diagnose.search.stepwise import (
+from rigsight.diagnose.search.several_effects import (
     larger_part_closed,
     refit_singles,
     settled,
     several_effects,
 )
+from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
 from rigsight.diagnose.search.worth_fitting import (
     Search,
     SingleModels,
@@ -186,7 +186,7 @@ def with_several_effects(
         beside = replace(campaign, modelled=(*campaign.modelled, *model.effects))
         return propose(beside, {**campaign.constants, **model.fit.all_values}, models.effects, context.noise)
 
-    found = several_effects(models, ask, forms, checks, lower_bound)
+    found = several_effects(models, ask, checks, lower_bound)
     for model in found[:1]:
         # The parts of a set compete with it, and tell the share of each.
         known = {single.names for single in models.singles}

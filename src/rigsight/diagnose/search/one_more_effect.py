@@ -101,7 +101,6 @@ def with_one_more(
     context: FitContext,
     parent: FittedModel,
     effects: Sequence[Effect],
-    known: Sequence[FittedModel],
     singles: Sequence[FittedModel],
     least_share: float = 0.0,
     enough: float = float("inf"),
@@ -111,12 +110,7 @@ def with_one_more(
     # `replaced` is an effect that was left out of the model, with the fit in which it was: its simpler and more general forms are
     # fitted whatever the screening says, the general ones from there.
     context = context.looking_at_residual(parent.fit)
-    known_sets = {frozenset(model.names) for model in known}
-    open_ones = [
-        effect
-        for effect in context.offered(effects)
-        if effect not in parent.effects and frozenset((*parent.names, effect.name)) not in known_sets
-    ]
+    open_ones = [effect for effect in context.offered(effects) if effect not in parent.effects]
     context.prepare(structures_of_shortlist(context.rig, open_ones, (*context.modelled, *parent.effects)))
     search = search_places(context, parent, open_ones)
     if search.most < least_share * _above_noise(parent.fit) / parent.fit.cost:

@@ -53,9 +53,9 @@ def test_an_effect_that_the_screening_puts_last_is_tried_where_the_first_ones_ex
     tried = [effect_named("maxwell_branch"), effect_named("flexible_mode")]
     assert [effect.name for effect in search_places(context, damped, tried).effects] == ["maxwell_branch"]
 
-    suggested = with_one_more(context, damped, tried, [], [damped])
+    suggested = with_one_more(context, damped, tried, [damped])
     assert all(model.names[-1] == "maxwell_branch" for model in suggested)
-    everything = with_one_more(context, damped, tried, [], [damped], enough=VERDICT.at_floor)
+    everything = with_one_more(context, damped, tried, [damped], enough=VERDICT.at_floor)
     best = min(everything, key=lambda model: model.error_over_noise)
     assert best.names == ("quadratic_damping", "flexible_mode")
     assert best.error_over_noise < VERDICT.at_floor
@@ -65,7 +65,7 @@ def test_an_effect_that_the_screening_puts_last_is_tried_where_the_first_ones_ex
 def test_an_effect_that_no_push_represents_is_tried_where_the_pushes_explain_too_little() -> None:
     context, damped = beside_a_damping("torque_ripple")
     tried = [effect_named("maxwell_branch"), effect_named("torque_ripple")]
-    (found,) = with_one_more(context, damped, tried, [], [damped], least_share=0.99)
+    (found,) = with_one_more(context, damped, tried, [damped], least_share=0.99)
     assert found.names == ("quadratic_damping", "torque_ripple")
     assert found.error_over_noise < VERDICT.at_floor
 
@@ -76,6 +76,6 @@ def test_beside_a_model_near_the_floor_an_effect_is_tried_that_explains_all_but_
     ripple = NOISE * np.sqrt(damped.error_over_noise**2 - 1.0)
     context, damped = beside_a_damping("torque_ripple", noise=ripple / np.sqrt(1.03**2 - 1.0))
     assert damped.error_over_noise < VERDICT.at_floor
-    (found,) = with_one_more(context, damped, [effect_named("torque_ripple")], [], [damped])
+    (found,) = with_one_more(context, damped, [effect_named("torque_ripple")], [damped])
     assert found.error_over_noise < VERDICT.exact
     assert found.fit.cost > SEARCH.worth_following * damped.fit.cost, "noise is most of both costs"

@@ -1,4 +1,4 @@
-"""Another form of an effect speaks against a second effect, except beside a memory or where only noise is left."""
+"""Another form of an effect speaks against a second effect, except where only noise is left."""
 
 from __future__ import annotations
 
@@ -10,10 +10,7 @@ import pytest
 
 from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.search.evidence_for_more import OtherForms
-from rigsight.effects import effect_named
 from rigsight.rigs import AXIS
-
-CANDIDATES = [effect_named(name) for name in ("quadratic_damping", "input_saturation", "sensor_lag")]
 
 
 class Explaining(OtherForms):
@@ -25,19 +22,6 @@ class Explaining(OtherForms):
 
     def gain(self, model: FittedModel) -> float:
         return self.part
-
-
-@pytest.mark.parametrize(
-    ("first", "left", "partners"),
-    [
-        ("coulomb_friction", 5.0, ["quadratic_damping"]),
-        ("coulomb_friction", 7.0, [effect.name for effect in CANDIDATES]),
-        ("bouc_wen_hysteresis", 5.0, [effect.name for effect in CANDIDATES]),
-    ],
-)
-def test_which_effects_are_tried_beside_one(scored, first: str, left: float, partners: list[str]) -> None:
-    single = scored((first,), error_over_noise=left)
-    assert [effect.name for effect in Explaining(13.0).partners(single, CANDIDATES)] == partners
 
 
 @pytest.mark.parametrize(

@@ -12,11 +12,9 @@ from rigsight.campaign import Campaign
 from rigsight.diagnose.diagnosis import diagnose
 from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.search import stepwise
-from rigsight.diagnose.search.evidence_for_more import OtherForms
-from rigsight.diagnose.search.one_more_effect import each_once
+from rigsight.diagnose.search.one_more_effect import each_once, part_of
+from rigsight.diagnose.search.several_effects import SeveralEffects, refit_singles, several_effects
 from rigsight.diagnose.search.single_effects import fit_candidate, fit_candidates, reidentify
-from rigsight.diagnose.search.stepwise import Stepwise, refit_singles, several_effects
 from rigsight.diagnose.search.together import Together
 from rigsight.diagnose.search.worth_fitting import SingleModels, WorthFitting
 from rigsight.effects import Effect, effect_named
@@ -118,9 +116,14 @@ def context_of(campaign: Campaign, held: frozenset[str] = frozenset()) -> FitCon
 
 def searching(
     context: FitContext, without: FittedModel, singles: list[FittedModel], effects: list[Effect]
-) -> Stepwise:
-    forms, together = OtherForms(context, lower_bound=False), Together(context, without, effects)
-    return Stepwise(context, singles, effects, forms, together)
+) -> SeveralEffects:
+    """Return the search where the motion does not show the missing force."""
+    together = Together(context, without, effects)
+
+    def is_settled(model: FittedModel) -> bool:
+        return model.error_over_noise <= VERDICT.at_floor
+
+    return SeveralEffects(context, singles, None, None, effects, together, lambda _: None, np.inf, is_settled)
 
 
 @pytest.mark.slow
@@ -129,7 +132,7 @@ def test_half_of_a_pair_may_have_been_left_out_of_the_singles() -> None:
     spring, lag = effect_named("cubic_stiffness"), effect_named("actuator_lag")
     reidentified = reidentify(context, VALUES)
     singles = fit_candidates(context, reidentified, [spring])
-    pairs = searching(context, reidentified, singles, [spring, lag]).found(VERDICT.at_floor, None)
+    pairs = searching(context, reidentified, singles, [spring, lag]).found()
     assert [pair.names for pair in pairs] == [("cubic_stiffness", "actuator_lag")]
 
 
@@ -145,7 +148,8 @@ def test_a_relative_gives_way_to_the_right_effect() -> None:
     pair = fit_candidate(context, (saturation, relative), alone.fit)
     assert pair.error_over_noise > 1.1
     search = searching(context, reidentified, singles, effects)
-    best, *_ = search.settled(search.exchanged([pair]))
+    found = search.exchanged(pair, relative, alone)
+    best = min(found, key=lambda model: model.error_over_noise)
     assert set(best.names) == {"input_saturation", "iwan_hysteresis"}
     assert best.error_over_noise < 1.05
     assert best.fit.values["u_max"] == pytest.approx(0.5, rel=1e-2)
@@ -156,21 +160,13 @@ def test_a_part_that_stopped_short_is_found_again_from_a_triple() -> None:
     two, hidden = ("input_saturation", "asymmetric_stiffness"), {"u_max": 0.5, "k_2": 500.0}
     campaign = measured({two[0]: {"u_max": 0.5}, two[1]: {"k_2": 500.0}}, seed=0)
     context = context_of(campaign, frozenset({"force_off"}))
-
-    def model(names: tuple[str, ...], own: dict[str, float]) -> FittedModel:
-        effects = tuple(effect_named(name) for name in names)
-        structure = context.composed(effects)
-        fit = context.problem(structure, context.estimation).fit({**VALUES, **own}, [])
-        return context.score(effects, replace(fit, free=tuple(context.free_parameters(structure))))
-
-    stopped = model(two, {"u_max": 2.0, "k_2": 500.0})
-    triple = model((*two, "cubic_stiffness"), {**hidden, "k_3": 10.0})
-    assert stopped.error_over_noise > 3.0 * triple.error_over_noise
-    parts = searching(context, triple, [], []).with_parts(triple, [stopped])
-    again = next(part for part in parts if set(part.names) == set(two))
-    assert again.error_over_noise == pytest.approx(1.0, abs=0.1)
-    assert again.fit.values["u_max"] == pytest.approx(0.5, rel=0.01)
-    assert len(parts) == 3, "each part of the triple once"
+    effects = tuple(effect_named(name) for name in (*two, "cubic_stiffness"))
+    structure = context.composed(effects)
+    fit = context.problem(structure, context.estimation).fit({**VALUES, **hidden, "k_3": 10.0}, [])
+    triple = context.score(effects, replace(fit, free=tuple(context.free_parameters(structure))))
+    part = part_of(context, triple, effects[:2])
+    assert part.error_over_noise == pytest.approx(1.0, abs=0.1)
+    assert part.fit.values["u_max"] == pytest.approx(0.5, rel=0.01)
 
 
 def test_of_models_with_the_same_effects_the_best_is_kept(scored) -> None:
@@ -178,26 +174,6 @@ def test_of_models_with_the_same_effects_the_best_is_kept(scored) -> None:
     worse, better = scored(two, error_over_noise=1.4), scored(two[::-1], error_over_noise=1.1)
     other = scored(("coulomb_friction", "backlash"), error_over_noise=1.2)
     assert each_once([worse, other, better]) == [better, other]
-
-
-def test_a_step_that_closes_less_than_half_ends_the_search(monkeypatch: pytest.MonkeyPatch, scored) -> None:
-    two = ("coulomb_friction", "cubic_stiffness")
-    single, pair = scored(two[:1], residuals=np.full(8, 9.0)), scored(two, residuals=np.full(8, 8.0))
-    asked: list[int] = []
-
-    def fitted(size: int) -> list[FittedModel]:
-        asked.append(size)
-        return [pair] if size == 2 else []
-
-    for name, same in (("refine", lambda _, models: models), ("finished", lambda _, model: model)):
-        monkeypatch.setattr(stepwise, name, same)
-    monkeypatch.setattr(stepwise, "with_one_more", lambda *_, **__: [])
-    monkeypatch.setattr(stepwise, "without_repeated_equations", lambda _, models: models)
-    effects = [effect_named(name) for name in two]
-    forms = SimpleNamespace(partners=lambda parent, effects: effects)
-    search = Stepwise(None, [single], effects, forms, SimpleNamespace(fitted=fitted))
-    assert search.found(VERDICT.at_floor, None) == []
-    assert asked == [2, 3], "three may explain together what no two do"
 
 
 def single_models(reidentified: FittedModel, single: FittedModel, worth: WorthFitting) -> SingleModels:
@@ -218,22 +194,24 @@ def test_above_a_lower_bound_a_pair_must_reach_it(
     scored, monkeypatch: pytest.MonkeyPatch, single: float, pair: float, adequate: bool | None, competes: bool
 ) -> None:
     found = [scored(("periodic_disturbance", "cubic_stiffness"), error_over_noise=pair)]
-    monkeypatch.setattr(Stepwise, "found", lambda *_: found)
+    monkeypatch.setattr(SeveralEffects, "found", lambda _: found)
     alone = scored(("periodic_disturbance",), error_over_noise=single, residuals=np.ones(8))
     checks = SimpleNamespace(is_adequate=lambda _: adequate)
     models = single_models(scored((), error_over_noise=40.0), alone, WorthFitting())
-    kept = several_effects(models, lambda _: None, None, checks, adequate is not None)
+    kept = several_effects(models, lambda _: None, checks, adequate is not None)
     assert kept == (found if competes else [])
 
 
 @pytest.mark.parametrize(
-    ("single", "adequate", "lower_bound", "nothing_remains"),
+    ("single", "adequate", "lower_bound", "is_asked"),
     [
-        pytest.param(1.06, False, False, VERDICT.exact, id="near the floor, and no noise"),
-        pytest.param(1.06, True, False, VERDICT.at_floor, id="near the floor, noise"),
-        pytest.param(1.02, False, False, VERDICT.at_floor, id="at the floor"),
-        pytest.param(5.0, False, False, VERDICT.at_floor, id="far above it"),
-        pytest.param(1.06, False, True, VERDICT.at_floor, id="a lower bound"),
+        pytest.param(1.06, False, False, True, id="near the floor, and no noise"),
+        pytest.param(1.06, True, False, False, id="near the floor, noise"),
+        pytest.param(1.02, False, False, False, id="at the floor"),
+        pytest.param(5.0, False, False, True, id="far above it"),
+        pytest.param(2.0, False, True, True, id="a lower bound, and no noise"),
+        pytest.param(2.0, True, True, False, id="a lower bound, noise"),
+        pytest.param(1.06, False, True, False, id="at a lower bound"),
     ],
 )
 def test_near_the_floor_a_remainder_that_is_no_noise_asks_for_a_second_effect(
@@ -242,33 +220,33 @@ def test_near_the_floor_a_remainder_that_is_no_noise_asks_for_a_second_effect(
     single: float,
     adequate: bool,
     lower_bound: bool,
-    nothing_remains: float,
+    is_asked: bool,
 ) -> None:
-    asked: list[float] = []
+    asked: list[bool] = []
 
-    def found(_search: Stepwise, at_floor: float, _checks: object) -> list[FittedModel]:
-        asked.append(at_floor)
+    def found(_search: SeveralEffects) -> list[FittedModel]:
+        asked.append(True)
         return []
 
-    monkeypatch.setattr(Stepwise, "found", found)
+    monkeypatch.setattr(SeveralEffects, "found", found)
     alone = scored(("periodic_disturbance",), error_over_noise=single, residuals=np.ones(8))
     checks = SimpleNamespace(is_adequate=lambda _: adequate)
     models = single_models(scored((), error_over_noise=15.0), alone, WorthFitting())
-    several_effects(models, lambda _: None, None, checks, lower_bound)
-    assert asked == [nothing_remains]
+    several_effects(models, lambda _: None, checks, lower_bound)
+    assert bool(asked) == is_asked
 
 
 def test_a_remainder_too_small_to_part_a_pair_from_a_single_effect_asks_for_none(scored) -> None:
     single = scored(("iwan_hysteresis",), error_over_noise=1.08, residuals=np.ones(8))
     checks = SimpleNamespace(is_adequate=lambda _: False)
     models = single_models(scored((), error_over_noise=130.0), single, WorthFitting())
-    assert several_effects(models, lambda _: None, None, checks, False) == []
+    assert several_effects(models, lambda _: None, checks, False) == []
 
 
 def test_a_residual_of_the_size_of_a_law_error_asks_for_no_second_effect(scored) -> None:
     single = scored(("cubic_stiffness",), error_over_noise=1.9, residuals=np.ones(8))
     models = single_models(scored((), error_over_noise=40.0), single, WorthFitting(is_shown=True))
-    assert several_effects(models, lambda _: None, None, None, False) == []
+    assert several_effects(models, lambda _: None, None, False) == []
 
 
 def test_a_single_that_stopped_short_is_found_again_from_a_pair() -> None:
