@@ -86,7 +86,8 @@ clean:  ## remove results and caches; the environment is kept (remove .venv to s
 
 # Stamps are written last: an interrupted installation is continued by the next call.
 # Runtime packages, pinned by the lock file, of which they are a third. hatchling, which builds the package, comes from
-# there too, so that no unpinned build tool is downloaded.
+# there too, so that no unpinned build tool is downloaded. What the commands import is compiled here: where bytecode is not
+# written (PYTHONDONTWRITEBYTECODE, usual in containers) every command would take seconds longer.
 $(RUNNABLE): pyproject.toml bench/pyproject.toml requirements.lock
 	@command -v $(PYTHON) >/dev/null || { echo "rigsight needs Python 3.11 or newer, and '$(PYTHON)' was not found. Name one: make $(MAKECMDGOALS) PYTHON=/path/to/python3.12" >&2; exit 1; }
 	@test ! -x $(BIN)/python || $(BIN)/python -c '$(NEW_ENOUGH)' || { echo "$(VENV) holds a Python older than 3.11: remove it (rm -r $(VENV)) and call make again." >&2; exit 1; }
@@ -98,6 +99,7 @@ $(RUNNABLE): pyproject.toml bench/pyproject.toml requirements.lock
 	 $(PIP_INSTALL) --only-binary uv "uv==0.13.8" 2>/dev/null || true; \
 	 $(call install,--constraint requirements.lock hatchling); \
 	 $(call install,--constraint requirements.lock --no-build-isolation --editable . --editable ./bench); \
+	 PYTHONDONTWRITEBYTECODE= $(BIN)/python -c 'import rigsight.workflow.diagnose, rigsight.workflow.discover'; \
 	 touch $@; \
 	 echo "Installed in $$(($$($(NOW)) - begun)) s."
 
