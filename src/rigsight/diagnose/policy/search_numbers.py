@@ -155,7 +155,7 @@ class SearchNumbers:
     most_refitted: int = budget(2, "Number of pairs whose effects are fitted alone again.")
     most_effects: int = convention(
         3,
-        "Number of effects up to which the search adds one at a time; sets that are selected along the motion may be larger.",
+        "Number of effects of a model beside which an even effect is no longer tried in the place of a constant force.",
     )
     most_windowed_pairs: int = budget(
         3, "Number of pairs that are fitted in windows: those with the lowest error on the whole records."
