@@ -105,9 +105,10 @@ def own_derivatives(
             there = theta + share * step
             there[:n_free] = np.clip(there[:n_free], coordinates.lower, coordinates.upper)
             tried = evaluated.sensitivities(there)[0]
-            # A motion that diverges is no improvement.
+            # A motion that diverges, or whose derivatives do, is no improvement.
             with np.errstate(over="ignore", invalid="ignore"):
-                if float(tried[0] @ tried[0]) < float(residual @ residual):
+                is_finite = bool(np.isfinite(np.sum(tried[1] ** 2)))
+                if is_finite and float(tried[0] @ tried[0]) < float(residual @ residual):
                     break
         else:
             break
