@@ -224,7 +224,7 @@ def _with_offset_rivals(
         if name in released
         and abs(best.fit.values[name]) > VERDICT.standard_errors * best.fit.standard_errors[name]
     ]
-    if not needed or len(best.effects) == SEARCH.most_effects:
+    if not needed or len(best.effects) >= SEARCH.most_effects:
         return ranking
     known = {frozenset(model.names) for model in ranking.order}
     rivals = []

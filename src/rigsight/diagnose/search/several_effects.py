@@ -73,13 +73,18 @@ class SeveralEffects:
         several = [model for model in models if len(model.effects) > 1]
         return larger_first(without_repeated_equations(self.context, several), self.singles)
 
+    @property
+    def _least_share(self) -> float:
+        """Share of the residual that a further effect must explain in the screening, which is exact for small effects only."""
+        return VERDICT.larger_part if self.proposal is not None else 0.0
+
     def _pool(self) -> list[FittedModel]:
         """Return the causes that the motion names, with further ones, and sets of those that it does not judge."""
         models = list(self._grown(self.singles[0]))
         # A delay and a resonance may hide each other: neither lowers the error without the other.
         if not models or not self.is_settled(min(models, key=_error)):
             for size in (2, 3):
-                sets = self.together.fitted(size, VERDICT.larger_part)
+                sets = self.together.fitted(size, self._least_share)
                 models += [one for one in sets if self._is_worth(one, self.singles[0])]
         return models
 
@@ -106,9 +111,7 @@ class SeveralEffects:
             model = self.named
             yield model
         judged = frozenset[str]() if self.proposal is None else self.proposal.judged
-        least, enough = (
-            (VERDICT.larger_part, np.inf) if self.proposal is not None else (0.0, VERDICT.at_floor)
-        )
+        enough = np.inf if self.proposal is not None else VERDICT.at_floor
         for _ in range(SEARCH.most_unnamed):
             if self.is_settled(model):
                 break
@@ -118,7 +121,7 @@ class SeveralEffects:
             beside = self.ask(model) if follows and self.proposal is not None else None
             leaves_out = judged if beside is not None or not follows else frozenset[str]()
             further = [effect for effect in self.effects if effect.name not in leaves_out]
-            larger_ones = with_one_more(self.context, model, further, self.singles, least, enough)
+            larger_ones = with_one_more(self.context, model, further, self.singles, self._least_share, enough)
             if beside is not None and (new := self._new(beside, model)):
                 larger_ones.append(with_causes(self.context, model, new, beside))
             best = min(larger_ones, key=_error, default=model)
@@ -237,7 +240,7 @@ def several_effects(models: SingleModels, ask: Ask, checks: Checks, lower_bound:
         proposal,
         models.together,
         models.effects,
-        Together(context, reidentified, worth.alone),
+        Together(context, reidentified, worth.alone if worth.is_shown else models.effects),
         ask,
         larger_part_closed(reidentified),
         is_settled,
