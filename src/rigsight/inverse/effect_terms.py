@@ -260,19 +260,20 @@ def _of_joint(
         one_sided = tuple(p.lower >= 0.0 for p in linear) or (True,)
     nothing = dict.fromkeys((p.name for p in linear), 0.0)
     tried, rows = list(grid_of(effect, linear, scales) if points is None else points), []
+    along = list(zip(fit.motions, moved, strict=True))
     for inner in tried:
         own = [{**inner, **nothing, p.name: unit} for p, unit in zip(linear, units, strict=True)] or [
             dict(inner)
         ]
-        along = list(zip(fit.motions, moved, strict=True))
         try:
             rows.append([[generalized(m, effect, o, values, joint) for o in own] for m, joint in along])
         except RigsightError:
             break
+    if not rows:
+        return
     # All points at once: a filter costs as much for one of them as for all.
-    filtered = [
-        m.thinned(np.array(own)) for m, own in zip(fit.motions, zip(*rows, strict=True), strict=False)
-    ]
+    of_motions = zip(*rows, strict=True)
+    filtered = [m.thinned(np.array(own)) for m, own in zip(fit.motions, of_motions, strict=True)]
     names, most = tuple(p.name for p in linear), tuple(max(map(abs, p.search)) for p in linear)
     for inner, *columns in zip(tried[: len(rows)], *filtered, strict=True):
         if all(np.all(np.isfinite(column)) for column in columns):
