@@ -14,7 +14,7 @@ from rigsight.workflow.campaign.model_file import named_model
 
 N_SAMPLES = 60
 UNITS = {"u": "A", "psi": "rad", "y": "m"}
-_FORMATS = Path(__file__).parents[2] / "tests/records/formats.py"
+_FORMATS = Path(__file__).parents[2] / "tests/records/formats/files.py"
 
 CAMPAIGN = """
 title = "rear axle"

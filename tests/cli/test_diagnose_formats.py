@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ..records.formats import Write, write_matlab_packed, write_tdms
+from ..records.formats.files import Write, write_matlab_packed, write_tdms
 
 Run = Callable[..., tuple[int, str, str]]
 

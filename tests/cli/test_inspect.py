@@ -16,7 +16,7 @@ from rigsight.records.formats.channel import Channel, ChannelFile
 from rigsight.records.formats.known import FORMATS as KNOWN
 from rigsight.rigs import RIGS
 
-from ..records.formats import FORMATS, Write, write_matlab, write_tdms, write_text
+from ..records.formats.files import FORMATS, Write, write_matlab, write_tdms, write_text
 
 Run = Callable[..., tuple[int, str, str]]
 T = 0.01 * np.arange(300)

@@ -11,7 +11,7 @@ import pytest
 from rigsight.errors import InputError
 from rigsight.records import ColumnMapping, ReadingOptions, Record, read_record
 
-from .formats import write_parquet, write_text
+from .formats.files import write_parquet, write_text
 
 
 @dataclass(frozen=True)

@@ -24,10 +24,10 @@ from rigsight.workflow.export import run_export
 from rigsight.workflow.simulate import run_simulate
 from rigsight.workflow.vary import run_vary
 
-from ..tiers import slow_but
+from ...tiers import slow_but
 from .keys_of_campaigns import CHANGES, COMMANDS, TOLD, TRUTH, written
 
-PAGE = (Path(__file__).parents[2] / "docs/keys.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs/keys.md").read_text(encoding="utf-8")
 OF_THE_READER = {"dt", "t0", "signals", "units", "source"}
 """Fields of a record that every command takes from it alike: what differs in nothing else was used when the record was read."""
 Found = Campaign | str
@@ -48,7 +48,7 @@ def test_every_key_of_a_campaign_is_in_the_table() -> None:
     tables = {"": CampaignTable, "rig.": RigTable, "records.": RecordTable, "columns.": ColumnTable}
     keys = [prefix + name for prefix, table in tables.items() for name in table.model_fields]
     keys = [key for key in keys if key not in ("rig", "records")]
-    remedy = "add a row to 'Keys of a campaign' in docs/keys.md and a line to CHANGES in tests/workflow/keys_of_campaigns.py"
+    remedy = "add a row to 'Keys of a campaign' in docs/keys.md and a line to CHANGES in keys_of_campaigns.py"
     assert set(OF_CAMPAIGNS) == set(keys), remedy
     assert set(CHANGES) == set(keys), remedy
 

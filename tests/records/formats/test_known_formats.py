@@ -15,9 +15,9 @@ from rigsight.records.formats.channel_file import open_channels
 from rigsight.records.formats.known import FORMATS as KNOWN
 from rigsight.records.formats.known import HEAD, Format, recognized
 
-from .formats import FORMATS, UNITS, rows, write_tdms
+from .files import FORMATS, UNITS, rows, write_tdms
 
-DOCUMENTED = (Path(__file__).parents[2] / "docs/records.md").read_text(encoding="utf-8")
+DOCUMENTED = (Path(__file__).parents[3] / "docs/records.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("known", KNOWN, ids=lambda known: known.key)

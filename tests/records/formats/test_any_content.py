@@ -15,7 +15,7 @@ from rigsight.errors import InputError
 from rigsight.records.formats.known import BY_SUFFIX, reader_of
 from rigsight.workflow.inspect import run_inspect
 
-from .formats import FORMATS
+from .files import FORMATS
 from .test_damaged_formats import SIGNALS, read
 
 # Their libraries crash over damaged files, and are only called in a process of their own.

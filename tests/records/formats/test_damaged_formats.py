@@ -13,8 +13,8 @@ import pytest
 from rigsight.errors import InputError
 from rigsight.records import read_record
 
-from ..tiers import slow_but
-from .formats import FORMATS, Write, write_matlab, write_text
+from ...tiers import slow_but
+from .files import FORMATS, Write, write_matlab, write_text
 
 
 @dataclass(frozen=True)

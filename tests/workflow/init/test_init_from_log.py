@@ -19,7 +19,7 @@ from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.campaign.signal_guesses import guess_file
 from rigsight.workflow.init import run_init, run_init_from_mjcf
 
-from ..records.robot_logs import START, bag, joint_state
+from ...records.formats.robot_logs import START, bag, joint_state
 
 ARM = """
 <mujoco model="arm">

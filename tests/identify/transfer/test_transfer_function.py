@@ -15,7 +15,7 @@ from rigsight.frequency import FrequencyResponse, local_polynomial_response, loc
 from rigsight.identify import TransferFit, TransferForm, fit_frequency_response
 from rigsight.records import Record
 
-from ..experiments.studies import of_study
+from ...experiments.studies import of_study
 
 over_time = of_study("thesis", "form_over_time").over_time
 PT2 = TransferForm("pt2", with_dead_time=True)

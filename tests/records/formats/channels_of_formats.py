@@ -9,7 +9,7 @@ import pytest
 
 from rigsight.records import ReadingOptions, Record, read_record
 
-from .formats import FORMATS
+from .files import FORMATS
 
 
 @dataclass(frozen=True)

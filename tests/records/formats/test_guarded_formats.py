@@ -14,7 +14,7 @@ from rigsight.records.formats.channel_file import file_format, open_channels
 from rigsight.records.formats.known import FORMATS as KNOWN
 
 from .channels_of_formats import formats, read
-from .formats import (
+from .files import (
     Write,
     rows,
     write_hdf5,

@@ -21,7 +21,7 @@ from rigsight.records.formats.channel import (
 )
 from rigsight.workflow.inspect import run_inspect
 
-from .formats import write_parquet
+from .files import write_parquet
 from .test_damaged_formats import HEADER, Named, element, matrix
 
 T = 0.01 * np.arange(60)

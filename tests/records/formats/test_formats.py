@@ -13,7 +13,7 @@ from rigsight.records.formats.channel_file import open_channels
 from rigsight.records.formats.known import BY_SUFFIX
 
 from .channels_of_formats import OUTPUTS, Named, formats, read
-from .formats import (
+from .files import (
     UNITS,
     Write,
     rows,

@@ -16,7 +16,7 @@ from rigsight.rigs import RIGS
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.init import run_init
 
-from ..records.formats import write_mdf, write_parquet, write_text
+from ...records.formats.files import write_mdf, write_parquet, write_text
 from .sweep_of_columns import ANSWER, SWEEP, T
 
 

@@ -14,7 +14,7 @@ from rigsight.records import ColumnMapping, ReadingOptions, Record, read_record
 from rigsight.records.formats.channel import Stored, stored_by
 from rigsight.records.formats.channel_file import open_channels
 
-from ..tiers import slow_but
+from ...tiers import slow_but
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from rigsight.rigs import AXIS, RUNNING_GEAR
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import Structure, compose, parameter_vector, simulate
 
-from ..tiers import slow_but
+from ...tiers import slow_but
 
 NOISE = 2e-5
 CONSTANTS = {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27}
