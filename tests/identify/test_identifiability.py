@@ -125,6 +125,20 @@ def test_a_parameter_that_does_next_to_nothing_is_named_alone(influence: float, 
     assert words in found.statements[0]
 
 
+@pytest.mark.parametrize("part", [0.05, 0.2])
+def test_what_alone_is_not_determined_is_not_named_with_others(part: float) -> None:
+    """Part of its influence is that of others, which are determined beside it."""
+
+    def function(k: float, m: float, s: float, o: float) -> Floats:
+        others = [wave(0.3, omega) for omega in (3.0, 7.0, 11.0)]
+        return (
+            k * others[0] + m * others[1] + s * others[2] + 0.0052 * o * (part * sum(others) + wave(0.7, 5.0))
+        )
+
+    found = said(function, k=0.5, m=0.4, s=0.3, o=0.1)
+    assert found.sentence == "The records determine k, m and s. o is not determined (standard error 53 %)."
+
+
 def test_what_is_all_determined_is_said_in_one_sentence() -> None:
     found = said(lambda k, d, w: k * wave(d, w), k=0.5, d=0.3, w=3.0)
     assert found.statements == ()

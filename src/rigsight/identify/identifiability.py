@@ -184,8 +184,12 @@ class _Search:
         return self._found.root @ np.column_stack([q.direction for q in self._quantities])
 
     def _alone(self) -> str:
-        """Report a quantity that the records would not determine even if all others were known, and remove it."""
-        errors = conditional_errors(self._root())
+        """Report a quantity that is not determined though all others are, or were they known, and remove it."""
+        # A small part of it in those that are determined is no reason to name them with it.
+        root = self._root()
+        errors, beside_others = conditional_errors(root), marginal_errors(root)
+        if np.count_nonzero(beside_others >= POORLY_KNOWN) == 1:
+            errors = beside_others
         index = int(np.argmax(errors))
         if errors[index] < POORLY_KNOWN:
             return ""
