@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.identify.identifiability import Identifiability, identifiability
-from rigsight.identify.information import Information, information
+from rigsight.identify.information import Information, information, percent
 from rigsight.records.record import Record
 from rigsight.rigs import read_rig_file
 from rigsight.simulate import compose, simulate
@@ -137,6 +137,14 @@ def test_what_alone_is_not_determined_is_not_named_with_others(part: float) -> N
 
     found = said(function, k=0.5, m=0.4, s=0.3, o=0.1)
     assert found.sentence == "The records determine k, m and s. o is not determined (standard error 53 %)."
+
+
+@pytest.mark.parametrize(
+    ("error", "text"),
+    [(0.016, "1.6 %"), (0.99, "99 %"), (0.998, "1 times its value"), (3.3, "3.3 times its value")],
+)
+def test_a_relative_error_is_written_without_powers_of_ten(error: float, text: str) -> None:
+    assert percent(error) == text
 
 
 def test_what_is_all_determined_is_said_in_one_sentence() -> None:

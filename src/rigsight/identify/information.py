@@ -114,8 +114,8 @@ def listed(names: Sequence[str]) -> str:
 
 
 def percent(error: float) -> str:
-    """Return a relative error in percent, or as a multiple of the value if it is large."""
-    return f"{100.0 * error:.2g} %" if error < 10.0 else f"{error:.2g} times its value"
+    """Return a relative error in percent, or as a multiple of the value from 100 % on."""
+    return f"{100.0 * error:.2g} %" if error < 0.995 else f"{error:.2g} times its value"
 
 
 def _power(text: str, power: int) -> str:
