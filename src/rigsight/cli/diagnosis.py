@@ -234,7 +234,7 @@ def _plan_summary(found: Plan) -> Group:
 
     from rigsight.report.plan import plan_headline, promise
 
-    rivals = [(one.effects, f"{one.probability:.2f}", f"{one.rms_left:.3g} errors") for one in found.rivals]
+    rivals = [(one.effects, f"{one.probability:.2f}", f"{one.rms_left:.2f} errors") for one in found.rivals]
     limits = [(limit.name, f"{limit.value:g}", f"{largest:.3g}") for limit, largest in found.limits]
     return Group(
         escape(plan_headline(found)),

@@ -227,10 +227,7 @@ def plan_experiment(
         tuple((limit, max(limit.reached(one) for one in readings)) for limit in kept),
         tuple(predictions),
         errors,
-        # Of a contest the most probable rival is the verdict so far; of usual sizes any may be.
-        float(np.mean([one.probability for one in predictions]))
-        if sizes != "fitted"
-        else predictions[0].probability,
+        sum(truth.weight * one.probability for truth, one in zip(truths, predictions, strict=True)),
         without_noise,
         trials,
         tuple(kinds.values())[:_LISTED],
@@ -277,6 +274,9 @@ def _outcome(truth: Truth, record: Record, clean: Record) -> Floats:
     contest = truth.contest
     errors = contest.remainder.errors(clean)
     against = [refitted(contest, rival, record, errors).against for rival in contest.rivals]
+    # Where a joint sticks the cost has many minima; that of the truth is near its own numbers.
+    near = refitted(contest, contest.rivals[truth.index], record, errors, truth.rival.fit.values).against
+    against[truth.index] = min(against[truth.index], near)
     return posterior([rival.probability for rival in contest.rivals], against)
 
 

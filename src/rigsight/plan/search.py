@@ -85,16 +85,23 @@ class Refitted:
     left: Floats  # of its readings, in units of their errors, shape (n_samples, n_outputs)
 
 
-def refitted(contest: Contest, rival: Rival, readings: Record, errors: Mapping[str, float]) -> Refitted:
-    """Fit a rival again to all records, of which the new one counts in units of its own errors."""
+def refitted(
+    contest: Contest,
+    rival: Rival,
+    readings: Record,
+    errors: Mapping[str, float],
+    start: Mapping[str, float] | None = None,
+) -> Refitted:
+    """Fit a rival again to all records, of which the new one counts in units of its own errors; from its own numbers or others."""
     fit, n_old = rival.fit, len(contest.records)
     new = contest.windowing.cut([readings])
     problem = GreyBoxFit(fit.structure, [*contest.records, *new], contest.context.scales, contest.errors)
     outputs = [signal.name for signal in contest.context.rig.outputs]
     units = np.array([errors.get(name, np.inf) for name in outputs])
     problem.data = _with_errors(problem.data, len(new), units)
-    states = guessed_states(problem.data, fit.values)[n_old:]
-    found = problem.fit(fit.values, fit.free, initial_states=[*fit.initial_states, *states])
+    values = fit.values if start is None else start
+    states = guessed_states(problem.data, values)[n_old:]
+    found = problem.fit(values, fit.free, initial_states=[*fit.initial_states, *states])
     if not found.residuals:
         return Refitted(math.inf, np.full((readings.n_samples, len(errors)), np.inf))
     against = max(found.cost - fit.cost, 0.0) / (2.0 * contest.remainder.independence)

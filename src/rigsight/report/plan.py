@@ -47,7 +47,7 @@ def render_plan(plan: Plan, picture: Figure, command: str, versions: Mapping[str
             picture,
             "plan",
             plan_headline(plan),
-            "The inputs, the readings that each rival predicts, and what is left of them.",
+            "The inputs, the readings that each rival predicts, and the residual of the others.",
         ),
         units=units,
         sizes=_SIZES[plan.sizes],
@@ -67,7 +67,7 @@ def promise(plan: Plan) -> str:
     gains = plan.promised > plan.now + _GAIN
     return (
         f"{'' if gains else 'No record within these limits tells these rivals apart. '}"
-        f"Expected probability of the cause afterwards: {plan.promised:.2f}, now {plan.now:.2f}. "
+        f"Expected probability of the cause: {plan.now:.2f} now, {plan.promised:.2f} afterwards. "
         f"In {trials.n} simulated outcomes the cause was the most probable in {percent(trials.right)}, "
         f"decided in {percent(trials.decided)}, wrongly in {percent(trials.wrong)}."
     )
