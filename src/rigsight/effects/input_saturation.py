@@ -27,7 +27,7 @@ INPUT_SATURATION = Effect(
     family=Family.DRIVE_LIMIT,
     summary="The drive cannot exceed a limit.",
     parameters=(
-        limit("u_max", "largest drive input", "input", lower=0.0, starts=(0.8, 0.4), search=(0.02, 2.0)),
+        limit("u_max", "largest drive input", "input", lower=0.0, starts=(0.8, 0.4), search=(0.02, 50.0)),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),

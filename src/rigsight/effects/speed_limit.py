@@ -39,7 +39,7 @@ SPEED_LIMIT = Effect(
             "input",
             lower=0.0,
             starts=(0.8, 0.5),
-            search=(0.02, 3.0),
+            search=(0.02, 50.0),
         ),
         Parameter(
             "c_u",

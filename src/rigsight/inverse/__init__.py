@@ -1,5 +1,6 @@
 """Inverse dynamics along the measured motion: which forces the equations lack, before anything is simulated."""
 
+from rigsight.inverse.drive_gain import gains_of_drives as gains_of_drives
 from rigsight.inverse.equation_fit import LAW_ERROR as LAW_ERROR
 from rigsight.inverse.equation_fit import EquationFit as EquationFit
 from rigsight.inverse.equation_fit import generalized as generalized

@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 def gains_of_known_scale(rig: Rig) -> dict[str, list[bool]]:
     """Return the parameters that are the gain of a drive against a known mass or weight, with whether it enters each equation."""
     mechanism = rig.mechanism
-    along = {name: drive.along.free_symbols for name, drive in _gains(rig).items()}
+    along = {name: drive.along.free_symbols for name, drive in gains_of_drives(rig).items()}
     if not along:
         return {}
     numbers = {sp.Symbol(p.name, real=True): sp.Integer(0) for p in rig.parameters}
@@ -34,7 +34,7 @@ def gains_of_known_scale(rig: Rig) -> dict[str, list[bool]]:
     return {name: [c.symbol in own for c in mechanism.free] for name, own in along.items() if own & moved}
 
 
-def _gains(rig: Rig) -> dict[str, Drive]:
+def gains_of_drives(rig: Rig) -> dict[str, Drive]:
     """Return the parameters to which the force of just one drive is proportional, with this drive."""
     found = {}
     for parameter in rig.parameters:

@@ -60,6 +60,8 @@ class RecordMotion:
     z, a, u
         States (n_states, n_samples), second derivatives of the coordinates (n_coordinates, n_samples) and inputs with their
         derivatives (3 n_inputs, n_samples).
+    is_integrated
+        Whether a coordinate is the integral of a reading, which drifts: what is slower than the motion is not known.
     """
 
     equations: RigEquations
@@ -67,6 +69,7 @@ class RecordMotion:
     z: Floats
     a: Floats
     u: Floats
+    is_integrated: bool = False
 
     @property
     def sensors(self) -> list[int]:
@@ -213,19 +216,30 @@ class RecordMotion:
     @cached_property
     def band(self) -> float:
         """End of the band in which forces are compared, in units of the Nyquist frequency."""
+        return WIDER * self._slower_than(_OF_MOTION)
+
+    def _slower_than(self, share: float) -> float:
+        """Return the frequency below which there is a share of the power of all velocities, in units of the Nyquist frequency."""
         n = self.equations.n_coordinates
         speeds = self.z[n : 2 * n] if n else self.u[1::3]
         power = np.sum(np.abs(np.fft.rfft(speeds * np.hanning(speeds.shape[1]))) ** 2, axis=0)
         below = np.cumsum(power) / max(float(np.sum(power)), 1e-300)
-        return float(WIDER * 2.0 * (np.searchsorted(below, _OF_MOTION) + 1) / speeds.shape[1])
+        return float(2.0 * (np.searchsorted(below, share) + 1) / speeds.shape[1])
 
     @cached_property
     def _filter(self) -> Floats:
-        return np.asarray(butter(_ORDER, self.band, output="sos"))
+        """Sections of the filter, shape (n_sections, 6); none where nothing is filtered."""
+        sections = [np.zeros((0, 6))]
+        if self.band < _HIGHEST:
+            sections.append(butter(_ORDER, self.band, output="sos"))
+        if self.is_integrated:
+            slowest = self._slower_than(1.0 - _OF_MOTION) / WIDER
+            sections.append(butter(_ORDER // 2, slowest, "highpass", output="sos"))
+        return np.concatenate(sections)
 
     def filtered(self, rows: Floats) -> Floats:
-        """Return rows (.., n_samples) without what is faster than the motion."""
-        if self.band >= _HIGHEST or rows.shape[-1] < 10 * _ORDER:
+        """Return rows (.., n_samples) without what is faster than the motion, or slower where the motion is integrated."""
+        if not len(self._filter) or rows.shape[-1] < 10 * _ORDER:
             return rows
         # Mirrored: an odd continuation would turn about the first sample, whose acceleration is the noisiest.
         return np.asarray(sosfiltfilt(self._filter, rows, axis=-1, padtype="even"))
@@ -327,9 +341,15 @@ def record_motion(rig: Rig, record: Record, values: Mapping[str, float]) -> Reco
         return RecordMotion(equations, complete, nothing, nothing, u)
     unknown = frozenset(p.name for p in rig.parameters if p.name not in values)
     filled = {**{p.name: 1.0 for p in rig.parameters}, **values}
-    found = measured_states(
-        equations, complete, equations.parameters(filled, complete), sensor_factors(equations, unknown)
-    )
+    p, factors = equations.parameters(filled, complete), sensor_factors(equations, unknown)
+    # What a sensor shows at rest: its zero, and what it reads of the inputs.
+    at_rest = equations.readings(np.zeros((equations.n_states, record.n_samples)), u, p)
+    shown = {
+        name: record[name] - rest
+        for name, rest in zip(equations.sensor_names, at_rest, strict=False)
+        if name in factors and name in record and np.all(np.isfinite(rest))
+    }
+    found = measured_states(equations, complete.with_signals(**shown), p, factors)
     if found is None:
         return None
     z, a = found.z.copy(), np.zeros((n, record.n_samples))
@@ -338,7 +358,7 @@ def record_motion(rig: Rig, record: Record, values: Mapping[str, float]) -> Reco
             z[n + i], a[i] = smooth_motion(z[n + i], record.dt)
         else:
             z[i], z[n + i], a[i] = accelerated_motion(z[i], record.dt)
-    return RecordMotion(equations, complete, z, a, u)
+    return RecordMotion(equations, complete, z, a, u, found.is_integrated)
 
 
 def along_change(by_motion: Floats, change: tuple[Floats, Floats]) -> Floats:

@@ -61,9 +61,12 @@ class Selection:
         # that of the forces. The numbers of the equations have taken their part of them.
         independent = max(self.regression.n_rows / WIDER - len(fit.free), 2.0)
         self.by_chance = 1.0 - (_SIGNIFICANCE / len(terms)) ** (2.0 / (independent - 1.0))
+        self.undecided = frozenset[str]()
         if fit.gains or not self.regression.predicts_accelerations:
             # Nothing tells a given force from masses that shrink, or from a gain that grows.
-            terms = [term for term in terms if not term.is_given]
+            kept = [term for term in terms if not term.is_given]
+            self.undecided = frozenset(t.effect.name for t in terms) - {t.effect.name for t in kept}
+            terms = kept
         self._add(terms)
 
     def _add(self, terms: Sequence[Term]) -> None:
@@ -223,6 +226,7 @@ class Selection:
             self.by_chance,
             numbers=numbers.values(self.columns_of(selected)),
             numbers_beside=numbers,
+            undecided=self.undecided,
             starts={
                 name: ProposedStart(
                     _rounded(self.parameters(i, [])),

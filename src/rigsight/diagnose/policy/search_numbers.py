@@ -92,6 +92,12 @@ class SearchNumbers:
         "If there are more starts, number of those fitted at length in pieces, the best after the very short fit first.",
         "hysteresis by sliders, five draws of noise: two to five of nine very short fits led to the best result",
     )
+    larger_gain: float = budget(
+        10.0,
+        "Factor of the gain of a drive in a further start beside a limit: a fit without the limit takes what it cuts off for "
+        "a small gain.",
+        "a position servo in its limit most of the time: factors of 10 and 30 lead to the best fit, 1 and 100 mostly not",
+    )
     wide_evaluations: int = budget(12, "Evaluations of a first fit to whole records.")
     near: float = budget(
         25.0,

@@ -158,7 +158,8 @@ def _comes_first(effect: Effect, search: Search, worth: WorthFitting, least: flo
     if not worth.is_shown:
         return effect in search.effects or effect in worth.named
     # What the motion does not judge has to explain enough itself, not only another effect at its place.
-    return effect in worth.named or search.shares.get(effect.name, search.most) >= least
+    is_candidate = effect in worth.named or effect.name in worth.undecided
+    return is_candidate or search.shares.get(effect.name, search.most) >= least
 
 
 def with_several_effects(

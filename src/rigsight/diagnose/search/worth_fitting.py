@@ -113,6 +113,7 @@ class WorthFitting:
     named: tuple[Effect, ...] = ()  # of those alone the ones of families that the motion names
     # Whether the motion shows every force that matters: a family that it rules out is not the main cause.
     is_shown: bool = False
+    undecided: frozenset[str] = frozenset()  # names of effects that only fits can judge beside the gain of their drive
     explained: float = 0.0  # share of the missing force that one family explains, or all that were taken
     # Of effects by their names: where they explain most of the missing force along the motion.
     starts: Mapping[str, ProposedStart] = field(default_factory=dict)
@@ -143,7 +144,8 @@ def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]
         # No family alone follows the motion: other forms are tried beside the families that explain it together.
         named = proposal.effects
     kept = tuple(e for e in effects if e.name not in proposal.judged or e in named)
-    return WorthFitting(kept, named, is_shown, max(most, proposal.explained), proposal.starts)
+    most = max(most, proposal.explained)
+    return WorthFitting(kept, named, is_shown, proposal.undecided, most, proposal.starts)
 
 
 def _needless_refinements(effects: Sequence[Effect], starts: Mapping[str, ProposedStart]) -> set[str]:

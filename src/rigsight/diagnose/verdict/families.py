@@ -223,6 +223,14 @@ def _weighed(
         per_share = FAMILIES.per_motion * (1.0 - proposal.by_chance)
         alone = [own for own in proposal.alone if any((own.family, own.where) in key for key in counting)]
         of_motion = {(own.family, own.where): _evidence(own.share, 0.0, per_share) for own in alone}
+        # What nothing tells from a larger gain is as probable by the motion as the best family: simulations decide.
+        open_to_motion = {
+            key
+            for model, own in zip(models, keys, strict=True)
+            for key in own
+            if proposal.undecided & set(model.names) and stands(model, reidentified, models)
+        }
+        of_motion |= dict.fromkeys(open_to_motion, max(of_motion.values(), default=0.0))
     weights = {}
     for key in dict.fromkeys(itertools.chain(*map(sorted, keys))):
         share = math.fsum(own for own, having in zip(of_rank, keys, strict=True) if key in having)
