@@ -173,6 +173,7 @@ def _assembled(
         rng.spawn(1)[0],
         found.proposal,
         judgement.by_motion,
+        ranking.impossible,
     )
     chosen = judgement.model.effects if is_effect else ()
     if judgement.by_motion:

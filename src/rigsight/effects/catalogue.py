@@ -9,6 +9,7 @@ from rigsight.effects.asymmetric_stiffness import ASYMMETRIC_STIFFNESS
 from rigsight.effects.back_driving_friction import BACK_DRIVING_FRICTION
 from rigsight.effects.backlash import BACKLASH
 from rigsight.effects.bouc_wen_hysteresis import BOUC_WEN_HYSTERESIS
+from rigsight.effects.coasting_bridge import COASTING_BRIDGE
 from rigsight.effects.command_delay import COMMAND_DELAY
 from rigsight.effects.command_filter import COMMAND_FILTER
 from rigsight.effects.command_rate_limit import COMMAND_RATE_LIMIT
@@ -87,6 +88,7 @@ CATALOGUE: tuple[Effect, ...] = (
     ACTUATOR_LAG,
     INPUT_SATURATION,
     SPEED_LIMIT,
+    COASTING_BRIDGE,
     INPUT_DEAD_ZONE,
     INTEGRAL_ACTION,
     SPEED_LOOP_INTEGRAL,

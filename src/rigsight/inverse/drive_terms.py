@@ -48,7 +48,7 @@ def of_required(
     if not all(p.null == 0.0 for p in effect.parameters):
         return
     found = _driving(effect, fit, values)
-    if found is None:
+    if found is None or effect.reads(canonical.v):
         return
     drive, _, _ = found
     small = {p.name: _SMALL_PART * usual(effect, p, scales) for p in effect.parameters}
@@ -79,14 +79,17 @@ def of_given(
         return
     drive, per_input, reaching = found
     for own in grid_of(effect, [], scales) if points is None else points:
-        columns = []
+        columns, arrives = [], False
         for motion, gain in zip(fit.motions, per_input, strict=True):
             equations, p = motion.equations, motion.equations.parameters(values, motion.record)
             along = equations.slopes_along(motion.z, motion.u, p)[drive.name]
             given = equations.at_places(motion.z, motion.u, p)[f"signal@{drive.name}"]
-            lost_force = gain * (given - reaching(given, *own.values()))
+            reached = reaching(given, _speed(drive, motion, values), *own.values())
+            arrives |= bool(np.any(reached))
+            lost_force = gain * (given - reached)
             columns.append(motion.thinned(along * lost_force)[None])
-        if all(np.all(np.isfinite(column)) for column in columns) and any(map(np.any, columns)):
+        is_finite = all(np.all(np.isfinite(column)) for column in columns)
+        if is_finite and arrives and any(map(np.any, columns)):
             yield Term(effect, own, (), (), tuple(columns), (False,), is_given=True)
 
 
@@ -103,11 +106,16 @@ def _driving(
 
 
 def _reaching(effect: Effect) -> Callable[..., Floats] | None:
-    """Return what a drive effect lets through as a function of its input and its parameters; None for one that reads more."""
+    """Return what a drive effect lets through as a function of its input, its speed and its parameters; None if it reads more."""
     own = [sp.Symbol(p.name, real=True) for p in effect.parameters]
-    if effect.drive is None or not effect.drive.free_symbols <= {canonical.u, *own}:
+    if effect.drive is None or not effect.drive.free_symbols <= {canonical.u, canonical.v, *own}:
         return None
-    return compiled(effect.drive, (canonical.u, *own))
+    return compiled(effect.drive, (canonical.u, canonical.v, *own))
+
+
+def _speed(drive: Drive, motion: RecordMotion, values: Mapping[str, float]) -> Floats:
+    """Return the speed of the shaft of a drive, shape (n_samples,)."""
+    return motion.along(motion.equations.rig.mechanism.rate(drive.along), values)
 
 
 def lost(
@@ -122,7 +130,7 @@ def lost(
     gain, reaching = force_per_input(drive, {**values, **motion.record.constants}), _reaching(effect)
     assert reaching is not None
     along, needed = _required(drive, gain, fit, motion, values)
-    return np.asarray(along * gain * (needed - reaching(needed, *own.values())))
+    return np.asarray(along * gain * (needed - reaching(needed, _speed(drive, motion, values), *own.values())))
 
 
 def force_per_input(drive: Drive, numbers: Mapping[str, float]) -> float:

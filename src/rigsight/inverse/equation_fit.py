@@ -59,7 +59,9 @@ def record_motions(rig: Rig, records: Sequence[Record], known: Mapping[str, floa
 
 def matters(motions: Sequence[RecordMotion], values: Mapping[str, float], name: str) -> bool:
     """Return True if a parameter has an influence on the equations along the motions."""
-    return any(bool(np.any(motion.slopes(values, [name]))) for motion in motions)
+    slopes = [(motion, motion.slopes(values, [name])) for motion in motions]
+    # Of a motion that drifts the filter leaves nothing of a constant force but rounding.
+    return any(_largest(motion.filtered(own)) > _RANK * _largest(own) for motion, own in slopes)
 
 
 def identifiable(
@@ -326,6 +328,10 @@ def per_force(motion: RecordMotion, joint: Joint, values: Mapping[str, float]) -
     names = [equations.sensor_names[i] for i in motion.sensors]
     one = np.ones(motion.record.n_samples)
     return np.array([one if name in reading else np.zeros_like(one) for name in names])
+
+
+def _largest(rows: Floats) -> float:
+    return float(np.max(np.abs(rows), initial=0.0))
 
 
 def _joined(rows: Sequence[Floats]) -> Floats:

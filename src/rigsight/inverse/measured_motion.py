@@ -60,8 +60,8 @@ class RecordMotion:
     z, a, u
         States (n_states, n_samples), second derivatives of the coordinates (n_coordinates, n_samples) and inputs with their
         derivatives (3 n_inputs, n_samples).
-    is_integrated
-        Whether a coordinate is the integral of a reading, which drifts: what is slower than the motion is not known.
+    drifts
+        Whether the equations read a coordinate that is the integral of a reading: what is slower than the motion is not known.
     """
 
     equations: RigEquations
@@ -69,7 +69,7 @@ class RecordMotion:
     z: Floats
     a: Floats
     u: Floats
-    is_integrated: bool = False
+    drifts: bool = False
 
     @property
     def sensors(self) -> list[int]:
@@ -228,18 +228,20 @@ class RecordMotion:
 
     @cached_property
     def _filter(self) -> Floats:
-        """Sections of the filter, shape (n_sections, 6); none where nothing is filtered."""
-        sections = [np.zeros((0, 6))]
-        if self.band < _HIGHEST:
-            sections.append(butter(_ORDER, self.band, output="sos"))
-        if self.is_integrated:
-            slowest = self._slower_than(1.0 - _OF_MOTION) / WIDER
-            sections.append(butter(_ORDER // 2, slowest, "highpass", output="sos"))
-        return np.concatenate(sections)
+        return np.asarray(butter(_ORDER, self.band, output="sos"))
+
+    @cached_property
+    def _slow_filter(self) -> Floats:
+        slowest = self._slower_than(1.0 - _OF_MOTION) / WIDER
+        return np.asarray(butter(_ORDER // 2, slowest, "highpass", output="sos"))
 
     def filtered(self, rows: Floats) -> Floats:
-        """Return rows (.., n_samples) without what is faster than the motion, or slower where the motion is integrated."""
-        if not len(self._filter) or rows.shape[-1] < 10 * _ORDER:
+        """Return rows (.., n_samples) without what is faster than the motion and, where it drifts, without what is slower."""
+        if rows.shape[-1] < 10 * _ORDER:
+            return rows
+        if self.drifts:
+            rows = sosfiltfilt(self._slow_filter, rows, axis=-1, padtype="even")
+        if self.band >= _HIGHEST:
             return rows
         # Mirrored: an odd continuation would turn about the first sample, whose acceleration is the noisiest.
         return np.asarray(sosfiltfilt(self._filter, rows, axis=-1, padtype="even"))
@@ -358,7 +360,9 @@ def record_motion(rig: Rig, record: Record, values: Mapping[str, float]) -> Reco
             z[n + i], a[i] = smooth_motion(z[n + i], record.dt)
         else:
             z[i], z[n + i], a[i] = accelerated_motion(z[i], record.dt)
-    return RecordMotion(equations, complete, z, a, u, found.is_integrated)
+    motion = RecordMotion(equations, complete, z, a, u)
+    by_place = motion.by_motion(filled)[:, :n] if found.is_integrated else np.zeros(0)
+    return replace(motion, drifts=bool(np.any(by_place)))
 
 
 def along_change(by_motion: Floats, change: tuple[Floats, Floats]) -> Floats:

@@ -87,6 +87,7 @@ def families_at_places(
     rng: np.random.Generator,
     proposal: Proposal | None = None,
     by_motion: bool = False,
+    impossible: frozenset[tuple[str, ...]] = frozenset(),
 ) -> tuple[FamilyAtPlace, ...]:
     """Return the families of the diagnosed model and of its probable rivals, the largest share first."""
     # Candidates are all scored models, each with its probability and its share of the ranking. A cause that has none of the forms
@@ -108,7 +109,8 @@ def families_at_places(
     own_keys = keys_of(rig, diagnosed.effects)
     of_sets = {key_set: [i for i, own in enumerate(keys) if own == key_set] for key_set in set(keys)}
     causes = {} if proposal is None else {(c.family, c.where): c for c in proposal.alone}
-    main = _weighed(rig, reidentified, models, [own[2] for own in usable], explained, proposal)
+    of_rank = [own[2] for own in usable]
+    main = _weighed(rig, reidentified, models, of_rank, explained, proposal, impossible)
     found = []
     for key in dict.fromkeys(itertools.chain(own_keys, *keys)):
         members = [i for i, own in enumerate(keys) if key in own]
@@ -162,6 +164,7 @@ def main_causes(
     candidates: Sequence[tuple[FittedModel, float]],
     noise: Floats,
     proposal: Proposal | None,
+    impossible: frozenset[tuple[str, ...]] = frozenset(),
 ) -> dict[Key, float]:
     """Return how probable each family is as the main cause where no law is exact, from models and their shares of the ranking."""
     usable = [
@@ -174,7 +177,7 @@ def main_causes(
     squares = squared_errors([reidentified.residuals, *(model.residuals for model, _ in usable)], noise)
     explained = np.asarray(1.0 - squares.mean[1:] / squares.mean[0])
     models, shares = [model for model, _ in usable], [share for _, share in usable]
-    return _weighed(rig, reidentified, models, shares, explained, proposal)
+    return _weighed(rig, reidentified, models, shares, explained, proposal, impossible)
 
 
 def probable_part(
@@ -205,12 +208,14 @@ def _weighed(
     of_rank: Sequence[float],
     explained: Floats,
     proposal: Proposal | None,
+    impossible: frozenset[tuple[str, ...]],
 ) -> dict[Key, float]:
     """Return how probable each family is as the main cause where no law is exact."""
     # A family that leaves the share r of a squared error is 1/r^n times as probable as one that explains nothing: n is half the
     # number of independent pieces of evidence that law errors leave in records. Simulation and motion are asked, and the share of
     # the ranking, which also knows which parameters are plausible; it counts as far as the best simulation explains the gap. The
-    # motion says nothing of a family all of whose fits end at a size of zero, unless simulations do not see its force.
+    # motion says nothing of a family all of whose fits end at a size of zero, unless simulations do not see its force. What cannot
+    # be the cause explains nothing.
     counts = float(np.clip(np.max(explained, initial=0.0), 0.0, 1.0))
     keys = [frozenset(keys_of(rig, model.effects)) for model in models]
     counting = [
@@ -235,7 +240,12 @@ def _weighed(
     for key in dict.fromkeys(itertools.chain(*map(sorted, keys))):
         share = math.fsum(own for own, having in zip(of_rank, keys, strict=True) if key in having)
         simulated = max(
-            (float(e) for e, having in zip(explained, keys, strict=True) if having == {key}), default=0.0
+            (
+                float(e)
+                for model, e, having in zip(models, explained, keys, strict=True)
+                if having == {key} and model.names not in impossible
+            ),
+            default=0.0,
         )
         weights[key] = max(share, FAMILIES.least_rank) ** counts * math.exp(
             _evidence(simulated, 0.0, FAMILIES.per_simulation) + of_motion.get(key, 0.0)

@@ -265,7 +265,8 @@ def by_motion(
     if proposal is None:
         return judgement
     shares = [grounds.share for grounds in ranking.grounds]
-    main = main_causes(rig, reidentified, list(zip(ranking.order, shares, strict=True)), noise, proposal)
+    candidates = list(zip(ranking.order, shares, strict=True))
+    main = main_causes(rig, reidentified, candidates, noise, proposal, ranking.impossible)
     key = max(main, key=lambda own: main[own], default=None)
     along = {(cause.family, cause.where): cause.share for cause in proposal.alone}
     share = 0.0 if key is None else along.get(key, 0.0)

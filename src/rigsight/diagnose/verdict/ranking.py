@@ -41,10 +41,13 @@ class Ranking:
     # units of the noise floor; RMS over all resamplings. Evidence, which uses all records, does not affect
     # this selection. NaN if a model was selected by other means, or nothing was left out.
     error_of_choice: float = math.nan
+    # Effects of models that cannot be the cause: of size zero, or slower or longer than the records show.
+    impossible: frozenset[tuple[str, ...]] = frozenset()
 
     def with_model(self, model: FittedModel) -> Ranking:
-        """Return the ranking with another fit of one of its models."""
-        return replace(self, order=tuple(model if m.names == model.names else m for m in self.order))
+        """Return the ranking with another fit of one of its models, which can be the cause."""
+        order = tuple(model if m.names == model.names else m for m in self.order)
+        return replace(self, order=order, impossible=self.impossible - {model.names})
 
 
 def rank(
@@ -128,6 +131,7 @@ def with_last(ranking: Ranking, models: Sequence[FittedModel]) -> Ranking:
         order=(*ranking.order, *models),
         probabilities=(*ranking.probabilities, *(0.0 for _ in models)),
         grounds=(*ranking.grounds, *(Grounds(0.0, 0.0, None) for _ in models)),
+        impossible=frozenset(model.names for model in models),
     )
 
 
