@@ -112,6 +112,7 @@ def diagnose(
     if any(floor.method == AT_REST for floor in found.floors) and _least_left(found) < VERDICT.refutes_rest:
         below_rest = _least_left(found)
         found = examine(campaign, effects, rng, n_jobs, say, prepare, memory, at_rest=False)
+    found = _with_most_probable_family(found, rng)
     notes = verdict_notes(Basis(campaign, found, rng, below_rest))
     diagnosis = _assembled(campaign, found, notes, rng)
     named = found.judgement.model if diagnosis.effects else found.reidentified
@@ -127,6 +128,48 @@ def diagnose(
 
 def _least_left(found: Examination) -> float:
     return min(model.error_over_noise for model in (found.before, found.reidentified, *found.ranking.order))
+
+
+def _with_most_probable_family(found: Examination, rng: np.random.Generator) -> Examination:
+    """Return the examination with the most probable family named, where another one was first in the ranking alone."""
+    judgement, rig = found.judgement, found.context.rig
+    own = keys_of(rig, judgement.model.effects)
+    if judgement.verdict != "effect" or judgement.by_motion or len(own) != 1:
+        return found
+    families = {(each.family, each.where): each.probability for each in _families(found, rng)}
+    most = max(families, key=lambda key: families[key])
+    forms = [
+        (grounds.share, model)
+        for model, grounds in zip(found.ranking.order, found.ranking.grounds, strict=True)
+        if keys_of(rig, model.effects) == (most,) and model.names not in found.ranking.impossible
+    ]
+    if most in own or not forms:
+        return found
+    _, form = max(forms, key=lambda own: own[0])
+    reason = (
+        f"{', '.join(form.names)} leaves {form.error_over_noise:.3g} times the noise floor, {', '.join(judgement.model.names)} "
+        f"{judgement.model.error_over_noise:.3g} times; by the force along the motion the former is more probable."
+    )
+    return replace(found, judgement=replace(judgement, model=form, reason=reason))
+
+
+def _families(found: Examination, rng: np.random.Generator) -> tuple[FamilyAtPlace, ...]:
+    ranking, calibration, situation = found.ranking, trained(), _situation(found)
+    probabilities = calibration.probabilities(situation, ranking.probabilities)
+    listed = math.fsum(probabilities) + calibration.without_effect(situation)
+    shares = [grounds.share for grounds in ranking.grounds]
+    return families_at_places(
+        found.context.rig,
+        found.reidentified,
+        found.judgement.model,
+        list(zip(ranking.order, probabilities, shares, strict=True)),
+        max(0.0, 1.0 - listed),
+        found.context.floors,
+        rng.spawn(1)[0],
+        found.proposal,
+        found.judgement.by_motion,
+        ranking.impossible,
+    )
 
 
 def _assembled(
@@ -163,18 +206,7 @@ def _assembled(
     candidates = tuple(
         sorted((*with_effect, without_effect), key=lambda c: (-c.probability, c.error_over_noise))
     )
-    families = families_at_places(
-        rig,
-        reidentified,
-        judgement.model,
-        [(model, probability, grounds.share) for model, probability, grounds in ranked],
-        probability_not_tried(candidates),
-        context.floors,
-        rng.spawn(1)[0],
-        found.proposal,
-        judgement.by_motion,
-        ranking.impossible,
-    )
+    families = _families(found, rng)
     chosen = judgement.model.effects if is_effect else ()
     if judgement.by_motion:
         rivals = _other_families(rig, ranking.order, families, judgement.model)

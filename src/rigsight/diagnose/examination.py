@@ -13,7 +13,7 @@ from rigsight.diagnose.data_quality.checks import data_quality, with_best_model,
 from rigsight.diagnose.data_quality.finding import DataQuality
 from rigsight.diagnose.data_quality.offsets_by_record import asked_offsets, with_offsets_free
 from rigsight.diagnose.fit_context import FitContext, FittedModel, Prepare, fit_context_of, start_values_of
-from rigsight.diagnose.noise.adequacy import Adequacy
+from rigsight.diagnose.noise.adequacy import Adequacy, Checks
 from rigsight.diagnose.noise.detection import NoiseFloor, noise_floors
 from rigsight.diagnose.noise.evidence import Evidence
 from rigsight.diagnose.policy import SEARCH, VERDICT
@@ -36,6 +36,7 @@ from rigsight.diagnose.verdict.judgement import (
 from rigsight.diagnose.verdict.plausibility import (
     doubts,
     is_beyond_records,
+    is_undetermined,
     plausible_first,
     stands,
 )
@@ -59,19 +60,29 @@ class Examination:
     ranking: Ranking  # the candidates
     judgement: Judgement  # the verdict
     quality: DataQuality  # quality of the data
+    checks: Checks  # say whether the residual of a model is noise and disturbance
     # Pairs with a low error that do not compete, because other laws fit equally well.
     imitations: tuple[FittedModel, ...] = ()
     # Share of the gap that a push explains, by place; empty on a rig with one motion.
     places: tuple[SuspectedPlace, ...] = ()
-    # Whether the residual of the diagnosed model is correlated with anything; None where that model could not
-    # be scored.
-    adequacy: Adequacy | None = None
-    doubts: tuple[str, ...] = ()  # implausible parameters of the diagnosed model
-    # For an unknown cause the joint, drive or sensor whose signals correlate most with the gap; empty where
-    # none is known.
-    gap_at: str = ""
     # What the motion says of the missing force; None where the sensors do not show the motion.
     proposal: Proposal | None = None
+
+    @property
+    def adequacy(self) -> Adequacy | None:
+        """Whether the residual of the diagnosed model correlates with anything; None where that model could not be scored."""
+        return self.checks.of(self.judgement.model) if self.judgement.model.residuals else None
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Implausible parameters of the diagnosed model."""
+        model = self.judgement.model
+        return tuple(doubt.text for doubt in doubts(model, self.reidentified)) if model.effects else ()
+
+    @property
+    def gap_at(self) -> str:
+        """For an unknown cause the joint, drive or sensor whose signals correlate most with the gap; empty where none does."""
+        return self.checks.of(self.reidentified).place if self.judgement.verdict == "unknown" else ""
 
 
 def examine(
@@ -125,9 +136,7 @@ def examine(
         judgement = by_motion(judgement, campaign.rig, reidentified, ranking, context.floors, proposal)
     quality = with_best_model(quality, context, judgement.model)
     quality = with_offsets_told(quality, context, judgement.model)
-    remainder = checks.of(judgement.model) if judgement.model.residuals else None
-    say("adequacy")
-    return Examination(
+    found = Examination(
         floors,
         context,
         models.alone.windowing,
@@ -136,15 +145,14 @@ def examine(
         ranking,
         judgement,
         quality,
+        checks,
         imitations,
         models.alone.search.places,
-        remainder,
-        tuple(doubt.text for doubt in doubts(judgement.model, reidentified))
-        if judgement.model.effects
-        else (),
-        checks.of(reidentified).place if judgement.verdict == "unknown" else "",
         models.alone.proposal,
     )
+    _ = found.adequacy
+    say("adequacy")
+    return found
 
 
 def _floors(
@@ -187,9 +195,8 @@ def _ranked(
     not_shown: list[FittedModel] = []
     duration = max(record.duration for record in context.records)
     for model in fitted:
-        is_shown = stands(model, reidentified, fitted) and not is_beyond_records(
-            model, context.scales, duration
-        )
+        is_shown = stands(model, reidentified, fitted) and not is_undetermined(model)
+        is_shown &= not is_beyond_records(model, context.scales, duration)
         (candidates if is_shown else not_shown).append(model)
     likeliest = min(contenders(candidates), key=evidence.criterion, default=None)
     # A likelihood treats the residual as noise: it is used only if the residual of the most likely model is noise.

@@ -66,6 +66,14 @@ def doubts(model: FittedModel, reidentified: FittedModel) -> tuple[Doubt, ...]:
     return tuple(found)
 
 
+def is_undetermined(model: FittedModel) -> bool:
+    """Return True if the records determine no parameter of an effect of a model that has parameters."""
+    fit = model.fit
+    own = [[fit.structure.parameter_name(e, p.name) for p in e.parameters] for e in model.effects]
+    of_effects = [[fit.standard_errors[name] for name in names if name in fit.free] for names in own]
+    return any(errors and not np.any(np.isfinite(errors)) for errors in of_effects)
+
+
 def has_size_of_zero(model: FittedModel, others: Sequence[FittedModel]) -> bool:
     """Return True if the size of one of the effects of a model does not differ from zero: it cannot be named."""
     # It does not if removing the effect does not raise chi square, or if its parameters with a null value are within their errors
