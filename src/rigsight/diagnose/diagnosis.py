@@ -53,7 +53,7 @@ from rigsight.diagnose.verdict.families import (
     shares_of_force,
     shares_of_gap,
 )
-from rigsight.diagnose.verdict.judgement import traced_to
+from rigsight.diagnose.verdict.judgement import traced_to, with_most_probable_family
 from rigsight.diagnose.verdict.ranking import Grounds
 from rigsight.diagnose.verdict_notes import Basis, verdict_notes
 from rigsight.effects import CATALOGUE, Effect
@@ -112,7 +112,10 @@ def diagnose(
     if any(floor.method == AT_REST for floor in found.floors) and _least_left(found) < VERDICT.refutes_rest:
         below_rest = _least_left(found)
         found = examine(campaign, effects, rng, n_jobs, say, prepare, memory, at_rest=False)
-    found = _with_most_probable_family(found, rng)
+    judgement = with_most_probable_family(
+        found.judgement, campaign.rig, found.ranking, _families(found, rng)
+    )
+    found = replace(found, judgement=judgement)
     notes = verdict_notes(Basis(campaign, found, rng, below_rest))
     diagnosis = _assembled(campaign, found, notes, rng)
     named = found.judgement.model if diagnosis.effects else found.reidentified
@@ -128,29 +131,6 @@ def diagnose(
 
 def _least_left(found: Examination) -> float:
     return min(model.error_over_noise for model in (found.before, found.reidentified, *found.ranking.order))
-
-
-def _with_most_probable_family(found: Examination, rng: np.random.Generator) -> Examination:
-    """Return the examination with the most probable family named, where another one was first in the ranking alone."""
-    judgement, rig = found.judgement, found.context.rig
-    own = keys_of(rig, judgement.model.effects)
-    if judgement.verdict != "effect" or judgement.by_motion or len(own) != 1:
-        return found
-    families = {(each.family, each.where): each.probability for each in _families(found, rng)}
-    most = max(families, key=lambda key: families[key])
-    forms = [
-        (grounds.share, model)
-        for model, grounds in zip(found.ranking.order, found.ranking.grounds, strict=True)
-        if keys_of(rig, model.effects) == (most,) and model.names not in found.ranking.impossible
-    ]
-    if most in own or not forms:
-        return found
-    _, form = max(forms, key=lambda own: own[0])
-    reason = (
-        f"{', '.join(form.names)} leaves {form.error_over_noise:.3g} times the noise floor, {', '.join(judgement.model.names)} "
-        f"{judgement.model.error_over_noise:.3g} times; by the force along the motion the former is more probable."
-    )
-    return replace(found, judgement=replace(judgement, model=form, reason=reason))
 
 
 def _families(found: Examination, rng: np.random.Generator) -> tuple[FamilyAtPlace, ...]:

@@ -9,8 +9,19 @@ import pytest
 
 from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.policy import FAMILIES
-from rigsight.diagnose.verdict.families import families_at_places, main_causes, shares_of_force
-from rigsight.diagnose.verdict.judgement import Judgement, by_motion, is_exact, with_unseen
+from rigsight.diagnose.verdict.families import (
+    FamilyAtPlace,
+    families_at_places,
+    main_causes,
+    shares_of_force,
+)
+from rigsight.diagnose.verdict.judgement import (
+    Judgement,
+    by_motion,
+    is_exact,
+    with_most_probable_family,
+    with_unseen,
+)
 from rigsight.diagnose.verdict.ranking import Grounds, Ranking
 from rigsight.effects import Family, effect_named
 from rigsight.inverse import Proposal, ProposedCause, ProposedStart
@@ -163,6 +174,30 @@ def test_of_two_families_that_remove_as_much_the_more_probable_one_is_named_with
     assert main[Family.SPRING_LAW, "dynamics"] == pytest.approx(0.5 / (1.0 + FAMILIES.failing), abs=0.01)
 
 
+def test_what_the_motion_cannot_tell_from_a_gain_is_judged_by_simulations_alone(reidentified, scored) -> None:
+    limit = with_cost(scored(("input_saturation",), error_over_noise=3.0, residuals=0.3 * GAP), 3e4)
+    friction = with_cost(scored(("coulomb_friction",), error_over_noise=6.0, residuals=0.6 * GAP), 3e4)
+    models = [(limit, 0.9), (friction, 0.1)]
+    seen = proposal(cause("coulomb_friction", 0.8))
+    of_limit, of_friction = (Family.DRIVE_LIMIT, "actuator"), (Family.DRY_FRICTION, "dynamics")
+    judged = main_causes(AXIS, reidentified, models, np.ones(1), seen)
+    assert judged[of_friction] > judged[of_limit]
+    left_open = replace(seen, undecided=frozenset({"input_saturation"}))
+    found = main_causes(AXIS, reidentified, models, np.ones(1), left_open)
+    assert found[of_limit] > 0.9
+
+
+def test_a_simulation_that_cannot_be_the_cause_is_no_evidence_of_its_family(reidentified, scored) -> None:
+    imitation = with_cost(scored(("flexible_mode",), error_over_noise=1.5, residuals=0.15 * GAP), 3e4)
+    friction = with_cost(scored(("coulomb_friction",), error_over_noise=5.0, residuals=0.5 * GAP), 3e4)
+    models = [(friction, 1.0), (imitation, 0.0)]
+    of_mode = (Family.RESONANCE, "dynamics")
+    assert main_causes(AXIS, reidentified, models, np.ones(1), None)[of_mode] > 0.3
+    impossible = frozenset({imitation.names})
+    found = main_causes(AXIS, reidentified, models, np.ones(1), None, impossible)
+    assert found[of_mode] < 0.1
+
+
 def test_a_named_family_is_kept_where_the_motion_names_it_too(reidentified, models) -> None:
     order = ranking((models["coulomb_friction"], 0.9), (models["cubic_stiffness"], 0.1))
     before = Judgement("effect", models["coulomb_friction"], "")
@@ -185,3 +220,17 @@ def test_a_simulation_that_leaves_noise_decides(
 ) -> None:
     best = scored(("coulomb_friction",), error_over_noise=error)
     assert is_exact(Judgement(verdict, best, ""), best, 1.6, lambda _: adequate) is exact
+
+
+@pytest.mark.parametrize(("of_friction", "named"), [(0.6, "coulomb_friction"), (0.3, "cubic_stiffness")])
+def test_the_most_probable_family_is_named_though_the_ranking_puts_another_one_first(
+    models, of_friction: float, named: str
+) -> None:
+    order = ranking((models["cubic_stiffness"], 0.6), (models["coulomb_friction"], 0.4))
+    families = [
+        FamilyAtPlace(family, "dynamics", probability, 0.5, (0.4, 0.6), ())
+        for family, probability in ((Family.SPRING_LAW, 0.38), (Family.DRY_FRICTION, of_friction))
+    ]
+    before = Judgement("effect", models["cubic_stiffness"], "")
+    found = with_most_probable_family(before, AXIS, order, families)
+    assert found.model.names == (named,)

@@ -12,6 +12,7 @@ from rigsight.diagnose.verdict.plausibility import (
     doubts,
     has_size_of_zero,
     is_beyond_records,
+    is_undetermined,
     plausible_first,
 )
 from rigsight.diagnose.verdict.ranking import Grounds, Ranking
@@ -51,6 +52,13 @@ def ranked(*models: FittedModel) -> Ranking:
         (),
         tuple(Grounds(share, share, None) for share in shares),
     )
+
+
+def test_an_effect_none_of_whose_numbers_the_records_determine_is_undetermined(models) -> None:
+    reidentified, coulomb, stribeck = models
+    assert not any(map(is_undetermined, (reidentified, coulomb, stribeck)))
+    errors = {**coulomb.fit.standard_errors, "T_c": np.inf}
+    assert is_undetermined(replace(coulomb, fit=replace(coulomb.fit, standard_errors=errors)))
 
 
 def test_plain_numbers_leave_no_doubt(models) -> None:

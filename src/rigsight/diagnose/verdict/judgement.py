@@ -7,7 +7,7 @@ cause is open. What a main cause leaves is the remainder: on a measured rig no l
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.noise.block_means import squared_errors
 from rigsight.diagnose.policy import FAMILIES, VERDICT
-from rigsight.diagnose.verdict.families import Key, keys_of, main_causes
+from rigsight.diagnose.verdict.families import FamilyAtPlace, Key, keys_of, main_causes
 from rigsight.diagnose.verdict.plausibility import stands
 from rigsight.diagnose.verdict.ranking import Ranking
 from rigsight.effects import Effect
@@ -289,4 +289,29 @@ def by_motion(
         f"{', '.join(form.names)} explains {along[key]:.0%} of the force that the equations leave along the measured motion, on "
         f"stretches that it was not fitted to. Simulated, it leaves {simulated:.0%} of the error of the equations.",
         by_motion=True,
+    )
+
+
+def with_most_probable_family(
+    judgement: Judgement, rig: Rig, ranking: Ranking, families: Sequence[FamilyAtPlace]
+) -> Judgement:
+    """Return the judgement with the most probable family named, where the ranking alone puts another one first."""
+    own = keys_of(rig, judgement.model.effects)
+    if judgement.verdict != "effect" or judgement.by_motion or len(own) != 1 or not families:
+        return judgement
+    most = max(families, key=lambda family: family.probability)
+    forms = [
+        (grounds.share, model)
+        for model, grounds in zip(ranking.order, ranking.grounds, strict=True)
+        if keys_of(rig, model.effects) == ((most.family, most.where),) and model.names not in ranking.impossible
+    ]
+    if (most.family, most.where) in own or not forms:
+        return judgement
+    _, form = max(forms, key=lambda each: each[0])
+    return replace(
+        judgement,
+        model=form,
+        reason=f"{', '.join(form.names)} leaves {form.error_over_noise:.3g} times the noise floor, "
+        f"{', '.join(judgement.model.names)} {judgement.model.error_over_noise:.3g} times; by the force along the motion the former "
+        f"is more probable.",
     )
