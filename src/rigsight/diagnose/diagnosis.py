@@ -112,9 +112,7 @@ def diagnose(
     if any(floor.method == AT_REST for floor in found.floors) and _least_left(found) < VERDICT.refutes_rest:
         below_rest = _least_left(found)
         found = examine(campaign, effects, rng, n_jobs, say, prepare, memory, at_rest=False)
-    judgement = with_most_probable_family(
-        found.judgement, campaign.rig, found.ranking, _families(found, rng)
-    )
+    judgement = with_most_probable_family(found.judgement, campaign.rig, found.ranking, _families(found, rng))
     found = replace(found, judgement=judgement)
     notes = verdict_notes(Basis(campaign, found, rng, below_rest))
     diagnosis = _assembled(campaign, found, notes, rng)

@@ -7,12 +7,12 @@ Equation
 c_b: drive input that is lost per input and speed; the effect vanishes at 0, ``1 / c_b`` is the no-load speed.
 
 Applies to brushed motors whose bridge opens in the pauses of the PWM (fast decay, "coast"): at a duty u the voltage drives the
-current and the back-EMF brakes for the share abs(u) of the time. A bridge that shorts the motor in the pauses ("brake") is linear:
-its back-EMF is part of the viscous damping.
+current, and the back-EMF brakes, for the share abs(u) of the time. A bridge that shorts the motor in the pauses ("brake") is
+linear: its back-EMF is part of the viscous damping.
 
 Signature: damping and bandwidth grow with the input; without input the motor coasts.
 
-References: N. Mohan, T. M. Undeland and W. P. Robbins, *Power Electronics* (Wiley 2003), section 7.7, on DC drives by full bridges.
+References: N. Mohan, T. M. Undeland and W. P. Robbins, *Power Electronics* (Wiley 2003), chapter 7.
 """
 
 import sympy as sp

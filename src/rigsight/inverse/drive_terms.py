@@ -130,7 +130,9 @@ def lost(
     gain, reaching = force_per_input(drive, {**values, **motion.record.constants}), _reaching(effect)
     assert reaching is not None
     along, needed = _required(drive, gain, fit, motion, values)
-    return np.asarray(along * gain * (needed - reaching(needed, _speed(drive, motion, values), *own.values())))
+    return np.asarray(
+        along * gain * (needed - reaching(needed, _speed(drive, motion, values), *own.values()))
+    )
 
 
 def force_per_input(drive: Drive, numbers: Mapping[str, float]) -> float:

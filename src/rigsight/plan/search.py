@@ -92,7 +92,7 @@ def refitted(
     errors: Mapping[str, float],
     start: Mapping[str, float] | None = None,
 ) -> Refitted:
-    """Fit a rival again to all records, of which the new one counts in units of its own errors; from its own numbers or others."""
+    """Fit a rival again to all records, from its own numbers or others; the new record counts in units of its own errors."""
     fit, n_old = rival.fit, len(contest.records)
     new = contest.windowing.cut([readings])
     problem = GreyBoxFit(fit.structure, [*contest.records, *new], contest.context.scales, contest.errors)

@@ -1,4 +1,4 @@
-"""A linear fit to a drive in its limit takes what the limit cuts off for a small gain: fits of the limit start from a larger one."""
+"""A linear fit to a drive in its limit takes what is cut off for a small gain: fits of the limit start from a larger one."""
 
 from __future__ import annotations
 

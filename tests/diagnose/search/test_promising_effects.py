@@ -87,9 +87,7 @@ def test_delays_are_no_candidates_for_a_free_motion_that_one_sensor_reads() -> N
     t = DT * np.arange(N)
     decay = Record("decay", DT, {"u": np.zeros(N), "x": np.exp(-t) * np.cos(20.0 * t)}, {})
     scales = characteristic_scales(AXIS, [decay], VALUES)
-    context = FitContext(
-        AXIS, (decay,), (decay,), (decay,), scales, {"x": NOISE}, frozenset(), VALUES
-    )
+    context = FitContext(AXIS, (decay,), (decay,), (decay,), scales, {"x": NOISE}, frozenset(), VALUES)
     offered = {effect.family for effect in context.offered(CATALOGUE)}
     assert Family.DELAY_OR_LAG not in offered
     assert Family.DRY_FRICTION in offered

@@ -107,7 +107,9 @@ def test_failed_models_come_last_with_nothing(scored, white) -> None:
 def test_only_failed_models(scored) -> None:
     failed = scored(("free_play",))
     ranking = ranked(failed)
-    assert ranking == Ranking((failed,), (0.0,), (), (Grounds(0.0, 0.0, None),), impossible=frozenset({failed.names}))
+    assert ranking == Ranking(
+        (failed,), (0.0,), (), (Grounds(0.0, 0.0, None),), impossible=frozenset({failed.names})
+    )
     assert ranked() == Ranking((), (), (), ())
 
 

@@ -242,7 +242,9 @@ def _with_larger_gain(
         if drive.name == context.rig.acts_at(effect) and gain in free:
             of_force = 1.0 if sp.Symbol(gain, real=True) in drive.signal.free_symbols else SEARCH.larger_gain
             for start in starts:
-                limited = {n: start[n] / of_force for n in (structure.parameter_name(effect, p) for p in limits)}
+                limited = {
+                    n: start[n] / of_force for n in (structure.parameter_name(effect, p) for p in limits)
+                }
                 yield {**start, **limited, gain: SEARCH.larger_gain * start[gain]}
 
 

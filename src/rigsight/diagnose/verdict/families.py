@@ -214,8 +214,8 @@ def _weighed(
     # A family that leaves the share r of a squared error is 1/r^n times as probable as one that explains nothing: n is half the
     # number of independent pieces of evidence that law errors leave in records. Simulation and motion are asked, and the share of
     # the ranking, which also knows which parameters are plausible; it counts as far as the best simulation explains the gap. The
-    # motion says nothing of a family all of whose fits end at a size of zero, unless simulations do not see its force. What cannot
-    # be the cause explains nothing.
+    # motion says nothing of a family all of whose fits end at a size of zero, unless simulations do not see its force. What
+    # cannot be the cause explains nothing.
     counts = float(np.clip(np.max(explained, initial=0.0), 0.0, 1.0))
     keys = [frozenset(keys_of(rig, model.effects)) for model in models]
     counting = [

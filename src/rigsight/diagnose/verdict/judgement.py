@@ -303,7 +303,8 @@ def with_most_probable_family(
     forms = [
         (grounds.share, model)
         for model, grounds in zip(ranking.order, ranking.grounds, strict=True)
-        if keys_of(rig, model.effects) == ((most.family, most.where),) and model.names not in ranking.impossible
+        if keys_of(rig, model.effects) == ((most.family, most.where),)
+        and model.names not in ranking.impossible
     ]
     if (most.family, most.where) in own or not forms:
         return judgement
@@ -312,6 +313,6 @@ def with_most_probable_family(
         judgement,
         model=form,
         reason=f"{', '.join(form.names)} leaves {form.error_over_noise:.3g} times the noise floor, "
-        f"{', '.join(judgement.model.names)} {judgement.model.error_over_noise:.3g} times; by the force along the motion the former "
-        f"is more probable.",
+        f"{', '.join(judgement.model.names)} {judgement.model.error_over_noise:.3g} times; by the force along the motion the "
+        f"former is more probable.",
     )
