@@ -23,6 +23,7 @@ from rigsight.inverse.controller_terms import ControlledMotion, controlled_motio
 from rigsight.inverse.drive_terms import late_drive, lost, of_given, of_required
 from rigsight.inverse.equation_fit import EquationFit, generalized, record_motions
 from rigsight.inverse.joint_force import JointMotion, joint_motion
+from rigsight.inverse.measured_motion import speed_at_rest
 from rigsight.inverse.parameter_grid import LEAST_SHARE, POINTS, beside, grid_of, usual
 from rigsight.inverse.sensor_terms import influence, late_reading, of_sensor
 from rigsight.inverse.term import Term, compiled
@@ -79,6 +80,23 @@ class EffectTerms:
         motions = record_motions(fit.rig, records, self.values)
         other = EquationFit(fit.rig, motions, fit.modelled, fit.free, self.values)
         return EffectTerms(other, self.values, self.scales)
+
+    def can_show(self, effect: Effect) -> bool:
+        """Return whether the motion can show an effect, as a term or not.
+
+        A force over a position needs one that a sensor or the equations know: from a free first one it is any constant force in each
+        record. A force that is even in the velocity needs both directions: in one it is that of an odd law.
+        """
+        if effect.place is not Place.DYNAMICS or effect.torque is None:
+            return True
+        motions = self.fit.motions
+        if effect.reads(canonical.x) and all(m.is_integrated and not m.drifts for m in motions):
+            return False
+        if effect.states or effect.torque.free_symbols & {canonical.x, canonical.position}:
+            return True
+        if derivative(effect.torque, canonical.v) == 0 or effect.torque.xreplace({canonical.v: -canonical.v}) != effect.torque:
+            return True
+        return not all(_moves_one_way(moved) for moved in self._motion_of(effect))
 
     def of(self, effect: Effect) -> Iterator[Term]:
         """Yield an effect at each point of the grid of its nonlinear parameters; nothing where it is no term.
@@ -238,6 +256,11 @@ class EffectTerms:
         if joint.name not in self._moved:
             self._moved[joint.name] = [joint_motion(m, joint, self.values) for m in self.fit.motions]
         return self._moved[joint.name]
+
+
+def _moves_one_way(moved: JointMotion) -> bool:
+    least = speed_at_rest(moved.v)
+    return bool(np.all(moved.v > -least) or np.all(moved.v < least))
 
 
 def _of_joint(

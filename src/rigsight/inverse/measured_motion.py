@@ -60,8 +60,10 @@ class RecordMotion:
     z, a, u
         States (n_states, n_samples), second derivatives of the coordinates (n_coordinates, n_samples) and inputs with their
         derivatives (3 n_inputs, n_samples).
+    is_integrated
+        Whether a coordinate is the integral of a reading, so that its zero and what is slower than the motion are not known.
     drifts
-        Whether the equations read a coordinate that is the integral of a reading: what is slower than the motion is not known.
+        Whether the equations read such a coordinate.
     """
 
     equations: RigEquations
@@ -69,6 +71,7 @@ class RecordMotion:
     z: Floats
     a: Floats
     u: Floats
+    is_integrated: bool = False
     drifts: bool = False
 
     @property
@@ -362,7 +365,7 @@ def record_motion(rig: Rig, record: Record, values: Mapping[str, float]) -> Reco
             z[i], z[n + i], a[i] = accelerated_motion(z[i], record.dt)
     motion = RecordMotion(equations, complete, z, a, u)
     by_place = motion.by_motion(filled)[:, :n] if found.is_integrated else np.zeros(0)
-    return replace(motion, drifts=bool(np.any(by_place)))
+    return replace(motion, is_integrated=found.is_integrated, drifts=bool(np.any(by_place)))
 
 
 def along_change(by_motion: Floats, change: tuple[Floats, Floats]) -> Floats:

@@ -67,6 +67,8 @@ def single_models(
     say("re-identified")
     proposal = propose(campaign, {**campaign.constants, **reidentified.fit.values}, effects, context.noise)
     say("missing force")
+    if proposal is not None:
+        effects = [effect for effect in effects if effect.name not in proposal.hidden]
     worth = worth_fitting(campaign.rig, proposal, effects)
     context = _with_known_motion(campaign, context, reidentified)
     if (
