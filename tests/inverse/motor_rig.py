@@ -5,7 +5,7 @@ from __future__ import annotations
 from rigsight.rigs import Rig
 from rigsight.rigs.reading.rig_file import rig_of_text
 
-_TEXT = """
+TEXT = """
 name = "motor"
 summary = "A motor turns something."
 [inputs.u]
@@ -41,4 +41,4 @@ unit = "rad"
 
 def motor_rig(kinetic: str, potential: str = "0", constants: str = "") -> Rig:
     """Return the rig with energies of its angle q; constants are tables of a rig file."""
-    return rig_of_text(_TEXT.format(kinetic=kinetic, potential=potential, constants=constants), "motor.toml")
+    return rig_of_text(TEXT.format(kinetic=kinetic, potential=potential, constants=constants), "motor.toml")

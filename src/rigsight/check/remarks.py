@@ -14,6 +14,7 @@ from rigsight.diagnose.data_quality.checks import sensor_faults
 from rigsight.diagnose.noise.detection import NoiseFloor
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.records import Record
+from rigsight.records.record import Floats
 from rigsight.records.signals import is_constant, moves_beyond_noise
 from rigsight.simulate import compose
 from rigsight.simulate.linearization import Linearization
@@ -26,6 +27,10 @@ _NOISY_INPUT = 0.02
 _LASTS = 0.995
 """RMS of the last third of a free motion over that of the third before from which it does not decay (an assumption): a rig that
 is damped so weakly is called the same."""
+_RESTS = 0.05
+"""The same over that of the whole record below which the motion has come to rest (a convention)."""
+_FEWEST_CROSSINGS = 4
+"""Crossings of the mean in a third of a record from which its RMS is one of whole swings: two periods."""
 _UNSTABLE = 1e-6
 """Real part of a pole over its size below which it is rounding."""
 _PAST = 12
@@ -82,9 +87,12 @@ def _of_reading(campaign: Campaign) -> Iterator[Remark]:
 
 def _noisy_inputs(campaign: Campaign, records: Sequence[CheckedRecord]) -> Iterator[Remark]:
     driving = _driving(campaign)
+    # What is held between samples has no noise that its differences would show.
+    held = {record.name for record in campaign.records if record.hold == "zoh"}
     for record in records:
         for channel in record.channels:
-            if channel.name in driving and channel.noise > _NOISY_INPUT * channel.std > 0.0:
+            measured = channel.name in driving and record.name not in held
+            if measured and channel.noise > _NOISY_INPUT * channel.std > 0.0:
                 yield Remark(
                     "warning",
                     f"Record {record.name}: {channel.name} has noise of {channel.noise:.2g} {channel.unit}, "
@@ -108,8 +116,11 @@ def _lasting(campaign: Campaign) -> Iterator[Remark]:
             continue
         for sensor in (s.name for s in campaign.rig.outputs if s.name in record):
             third = record.n_samples // 3
-            before, last = (np.std(part) for part in np.split(record[sensor][-2 * third :], 2))
-            if last > _LASTS * before and moves_beyond_noise(record[sensor]):
+            parts = np.split(record[sensor][-2 * third :], 2)
+            before, last = map(np.std, parts)
+            swings = all(_crossings(part) >= _FEWEST_CROSSINGS for part in parts)
+            still_moves = last > max(_LASTS * before, _RESTS * np.std(record[sensor]))
+            if swings and still_moves and moves_beyond_noise(record[sensor]):
                 yield Remark(
                     "warning",
                     f"Record {record.name}: {sensor} does not decay while nothing drives the rig (RMS of the last third "
@@ -119,6 +130,10 @@ def _lasting(campaign: Campaign) -> Iterator[Remark]:
                     record.name,
                     sensor,
                 )
+
+
+def _crossings(part: Floats) -> int:
+    return int(np.count_nonzero(np.diff(np.sign(part - np.mean(part)))))
 
 
 def _unstable(linear: Linearization | None) -> Iterator[Remark]:

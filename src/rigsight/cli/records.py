@@ -228,7 +228,7 @@ def _of_campaign(draft: Draft, folder: Path) -> tuple[dict[str, Any], list[str]]
 
 def _what_is_next(n_blanks: int, folder: Path) -> str:
     remedy = f'Replace each "FILL IN" ({n_blanks} times) in it.' if n_blanks else "Check the comments in it."
-    return f"{remedy} Then: rigsight diagnose {folder}"
+    return f"{remedy} Then: rigsight check {folder}, and rigsight diagnose {folder}"
 
 
 def _of_robot(written: ModelDraft, folder: Path, as_it_is: bool) -> tuple[dict[str, Any], list[str]]:

@@ -84,8 +84,8 @@ class EffectTerms:
     def can_show(self, effect: Effect) -> bool:
         """Return whether the motion can show an effect, as a term or not.
 
-        A force over a position needs one that a sensor or the equations know: from a free first one it is any constant force in each
-        record. A force that is even in the velocity needs both directions: in one it is that of an odd law.
+        A force over a position needs one that a sensor or the equations know: with a free first one it is any constant force in
+        each record. A force that is even in the velocity needs both directions: in one it is that of an odd law.
         """
         if effect.place is not Place.DYNAMICS or effect.torque is None:
             return True
@@ -94,7 +94,10 @@ class EffectTerms:
             return False
         if effect.states or effect.torque.free_symbols & {canonical.x, canonical.position}:
             return True
-        if derivative(effect.torque, canonical.v) == 0 or effect.torque.xreplace({canonical.v: -canonical.v}) != effect.torque:
+        if (
+            derivative(effect.torque, canonical.v) == 0
+            or effect.torque.xreplace({canonical.v: -canonical.v}) != effect.torque
+        ):
             return True
         return not all(_moves_one_way(moved) for moved in self._motion_of(effect))
 

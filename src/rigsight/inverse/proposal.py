@@ -120,7 +120,9 @@ class Proposal:
     judged: frozenset[str]  # names of the effects that are terms of this regression
     # Names of effects whose forces nothing tells from a larger gain or smaller masses: a limit of a drive beside its gain.
     undecided: frozenset[str] = field(default=frozenset(), kw_only=True)
-    hidden: frozenset[str] = field(default=frozenset(), kw_only=True)  # names of effects that this motion cannot show
+    hidden: frozenset[str] = field(
+        default=frozenset(), kw_only=True
+    )  # names of effects that this motion cannot show
     # Share of the squared residual that those taken remove together.
     explained: float
     # Share that the best of so many terms exceeds in one of a hundred cases if none has to do with the

@@ -16,7 +16,6 @@ from rigsight.rigs import RIGS, Rig
 from rigsight.robots import FreeRun, RigDraft, free_run, read_robot, rig_text, with_gears
 from rigsight.workflow.campaign.campaign_file import MOST_RECORDS
 from rigsight.workflow.campaign.record_proposal import (
-    ASSUMED_HOLD,
     BLANK,
     KNOWN_HOLD,
     Proposal,
@@ -235,7 +234,7 @@ def campaign_text(
         for one in rig.parameters
     ]
     for proposal, (role, remark) in zip(proposals, _roles(proposals), strict=True):
-        held = ASSUMED_HOLD if values is None else KNOWN_HOLD
+        held = "" if values is None else KNOWN_HOLD
         lines += ["", proposal.toml(role, remark, held).rstrip("\n")]
     if left_out:
         lines += ["", "# Not used:"]

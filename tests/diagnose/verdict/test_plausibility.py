@@ -112,6 +112,8 @@ def test_a_model_that_is_far_worse_or_elsewhere_does_not(models, scored) -> None
         ("maxwell_branch", {"k_m": 1.0, "tau_m": 30.0}, True),
         ("maxwell_branch", {"k_m": 1.0, "tau_m": 3.0}, False),
         ("flexible_mode", {"m_a": 78000.0, "w_a": 0.2, "zeta_a": 0.1}, True),
+        ("periodic_disturbance", {"T_p": 1.0, "w_p": 0.6}, True),
+        ("periodic_disturbance", {"T_p": 1.0, "w_p": 1.5}, False),
         ("presliding_friction", {"T_c": 1.0, "x_p": 20900.0}, True),
         ("coulomb_friction", {"T_c": 1.0}, False),
     ],

@@ -338,3 +338,11 @@ def test_the_gain_of_an_input_in_another_unit_is_asked_about(tmp_path: Path) -> 
     with (tmp_path / "campaign.toml").open("a") as file:
         file.write('columns = { u = { name = "u", unit = "kN", unwrap = false } }\n')
     np.testing.assert_allclose(read_campaign(tmp_path).records[0]["u"], 1e3 * SWEEP, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("drive", "hold"), [(SWEEP, "foh"), (0.5 * np.sign(SWEEP), "zoh"), (np.round(SWEEP, 2), "foh")]
+)
+def test_an_input_that_stays_and_jumps_is_held(tmp_path: Path, drive: np.ndarray, hold: str) -> None:
+    write_text(tmp_path / "a.csv", {"t": T, "u": drive, "x": ANSWER}, {})
+    assert f'hold = "{hold}"' in run_init(tmp_path).path.read_text("utf-8")

@@ -86,6 +86,11 @@ class VerdictNumbers:
         3.0,
         "Standard errors from zero, or from the known value, at which a parameter counts as significant: a chance of one in 370.",
     )
+    least_periods: float = assumption(
+        3.0,
+        "Periods of a tone or a resonance in the longest record below which it is a slow force of any shape: its phase is free "
+        "in each record.",
+    )
     comparable: float = assumption(
         1.5,
         "Factor of the best error within which a model is a contender, because no model is exact. Contenders are fitted to full "

@@ -44,7 +44,11 @@ ASSUMED_HOLD = (
     'hold = "foh"  # assumed; "zoh" if a controller holds the input between samples, "band_limited" for a filtered analog '
     "signal: a wrong one looks like a delay of half a sample"
 )
+SEEN_HOLD = 'hold = "zoh"  # guessed: the input stays and jumps; check'
 KNOWN_HOLD = 'hold = "zoh"  # the controller holds each command until the next one'
+_REPEATED, _JUMP = 0.25, 0.05
+"""Share of samples that equal the one before, and median jump of the others in units of the range, from which an input is held (a
+convention)."""
 _STEP = 0.02
 """Time step at which channels are compared [s]."""
 _PAUSE, _SHORTEST = 1.0, 1.0
@@ -69,6 +73,7 @@ class Proposal:
     lines: tuple[str, ...]  # lines of TOML below ``role``, with what must be checked as comments
     n_blanks: int  # how many values are left to be filled in
     stretches: tuple[tuple[float, float], ...] = ()  # of a log of a robot: those in which it moves [s]
+    is_held: bool = False  # whether every input stays and jumps
 
     @property
     def each_stretch(self) -> tuple[Proposal, ...]:
@@ -81,13 +86,14 @@ class Proposal:
             for begin, end in self.stretches
         )
 
-    def toml(self, role: Role, remark: str = "", hold: str = ASSUMED_HOLD) -> str:
+    def toml(self, role: Role, remark: str = "", hold: str = "") -> str:
         """Return the ``[[records]]`` entry, for a role that is explained by a remark, with the line on the hold of the input."""
         head = [
             "[[records]]",
             f"file = {quoted(self.file)}",
             f'role = "{role}"' + (f"  # {remark}" if remark else ""),
         ]
+        hold = hold or (SEEN_HOLD if self.is_held else ASSUMED_HOLD)
         held = [hold] if self.guess.rig.inputs else []
         return "\n".join([*head, *held, *self.lines]) + "\n"
 
@@ -120,7 +126,16 @@ def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig]) -> Proposal:
     if columns:
         lines += ["[records.columns]", *columns]
     stretches = tuple(_stretches(guess)) if is_log else ()
-    return Proposal(path.name, guess, tuple(lines), timing_blanks + column_blanks, stretches)
+    inputs = [one.channel for one in guess.signals[: len(guess.rig.inputs)]]
+    is_held = bool(inputs) and all(one is not None and _is_held(as_floats(one.load())) for one in inputs)
+    return Proposal(path.name, guess, tuple(lines), timing_blanks + column_blanks, stretches, is_held)
+
+
+def _is_held(samples: Floats) -> bool:
+    steps = np.abs(np.diff(samples[np.isfinite(samples)]))
+    if not np.any(steps) or np.mean(steps == 0.0) < _REPEATED:
+        return False
+    return bool(np.median(steps[steps > 0.0]) >= _JUMP * np.ptp(samples[np.isfinite(samples)]))
 
 
 def _stretches(guess: FileGuess) -> list[tuple[float, float]]:

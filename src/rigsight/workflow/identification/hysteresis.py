@@ -36,21 +36,24 @@ def structure_with_memory(campaign: Campaign, effects: Sequence[Effect]) -> Stru
     """Return the rig with these effects and those that the campaign's simulation has already."""
     rig = campaign.rig
     names = " ".join(f"--effect {effect.name}" for effect in effects)
-    instead = f"'rigsight diagnose {names}' fits effects to such a rig."
+    folder = "CAMPAIGN" if campaign.folder is None else campaign.folder
+    instead = f"'rigsight diagnose {folder} {names}' fits effects to any rig."
     if not rig.has_one_motion:
         raise InputError(
-            f"Hysteresis is calibrated on rigs of one motion, and {rig.name} has more. {instead}"
+            f"--effect calibrates effects with a memory, on the built-in rigs of one motion; {rig.name} is none of them. "
+            f"{instead}"
         )
     if campaign.drifts or rig.motion.stiffness == 0:
         raise InputError(
-            f"Hysteresis is calibrated where a spring brings the rig back, and this {rig.name} has none. {instead}"
+            f"--effect calibrates effects with a memory where a spring brings the rig back, and this {rig.name} has none. "
+            f"{instead}"
         )
     chosen = effects_on(rig, effects, "--effect")
     if not any(_has_memory(effect) for effect in chosen):
         known = ", ".join(effect.name for effect in CATALOGUE if _has_memory(effect) and rig.offers(effect))
         raise InputError(
             f"None of the effects ({', '.join(effect.name for effect in chosen)}) gives the spring a memory; name one that does: "
-            f"{known}. 'rigsight diagnose {names}' fits the others alone."
+            f"{known}. 'rigsight diagnose {folder} {names}' fits the others alone."
         )
     beside = [effect for effect in campaign.modelled if all(effect.name != one.name for one in chosen)]
     of_spring = [effect.name for effect in (*beside, *chosen) if effect.spring is not None and effect.states]

@@ -1,0 +1,50 @@
+"""Which effects can a motion not show, whatever the equations leave?"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigsight.campaign import Campaign
+from rigsight.diagnose.fit_context import candidates_on
+from rigsight.effects import CATALOGUE, effect_named, kind_of
+from rigsight.inverse import propose
+from rigsight.records import Record
+from rigsight.rigs.reading.rig_file import rig_of_text
+from rigsight.simulate import compose, simulate
+
+from .motor_rig import TEXT, motor_rig
+
+SHOWS_ANGLE = motor_rig("J*d(q)^2/2")
+SHOWS_SPEED = rig_of_text(
+    TEXT.format(kinetic="J*d(q)^2/2", potential="0", constants="").replace(
+        '[sensors.angle]\nreads = "q"\nunit = "rad"', '[sensors.speed]\nreads = "d(q)"\nunit = "rad/s"'
+    ),
+    "motor.toml",
+)
+OF_POSITION = {"cubic_stiffness", "gravity_pendulum", "end_stop", "position_dependent_damping"}
+VALUES = {"J": 2e-3, "k_v": 0.6, "d": 0.02, "T_c": 0.05}
+DT = 5e-3
+
+
+@pytest.mark.parametrize(
+    ("rig", "mean", "hidden"),
+    [
+        (SHOWS_ANGLE, 0.0, set()),
+        (SHOWS_ANGLE, 0.5, {"directional_damping"}),
+        (SHOWS_SPEED, 0.0, OF_POSITION),
+        (SHOWS_SPEED, 0.5, {*OF_POSITION, "directional_damping"}),
+    ],
+)
+def test_a_force_over_an_unknown_position_and_a_difference_of_directions_in_one_are_hidden(
+    rig, mean: float, hidden: set[str]
+) -> None:
+    t = DT * np.arange(2000)
+    u = mean + 0.3 * np.sin(3.0 * t)
+    structure = compose(rig, [effect_named("coulomb_friction")])
+    run = simulate(structure, VALUES, Record("run", DT, {"u": u}, {}, hold="foh"))
+    found = propose(Campaign("motor", rig, {}, {}, (run,)), VALUES, candidates_on(rig, CATALOGUE))
+    assert found is not None
+    asked = {*OF_POSITION, "directional_damping"}
+    assert asked & set(map(kind_of, found.hidden)) == hidden
+    assert found.taken[0].family == "dry_friction"
