@@ -118,7 +118,7 @@ class Proposal:
     taken: tuple[ProposedCause, ...]
     alone: tuple[ProposedCause, ...]  # every family at every place by itself, the largest share first
     judged: frozenset[str]  # names of the effects that are terms of this regression
-    # Names of effects whose forces nothing tells from a larger gain or smaller masses: a limit of a drive beside its gain.
+    # Names of effects whose forces nothing tells from a larger gain of their drive, such as its limit.
     undecided: frozenset[str] = field(default=frozenset(), kw_only=True)
     hidden: frozenset[str] = field(
         default=frozenset(), kw_only=True

@@ -61,13 +61,12 @@ class Selection:
         # that of the forces. The numbers of the equations have taken their part of them.
         independent = max(self.regression.n_rows / WIDER - len(fit.free), 2.0)
         self.by_chance = 1.0 - (_SIGNIFICANCE / len(terms)) ** (2.0 / (independent - 1.0))
-        self.undecided = frozenset[str]()
-        if fit.gains or not self.regression.predicts_accelerations:
-            # Nothing tells a given force from masses that shrink, or from a gain that grows.
-            kept = [term for term in terms if not term.is_given]
-            self.undecided = frozenset(t.effect.name for t in terms) - {t.effect.name for t in kept}
-            terms = kept
-        self._add(terms)
+        # Nothing tells a given force from masses that shrink, or from a gain that grows.
+        left_out = bool(fit.gains) or not self.regression.predicts_accelerations
+        kept = [term for term in terms if not (term.is_given and left_out)]
+        of_gain = terms if fit.gains else kept
+        self.undecided = frozenset(t.effect.name for t in of_gain) - {t.effect.name for t in kept}
+        self._add(kept)
 
     def _add(self, terms: Sequence[Term]) -> None:
         ends = np.cumsum([self.regression.n_columns, *(len(term.columns[0]) for term in terms)])
