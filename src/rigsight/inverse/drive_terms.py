@@ -78,19 +78,28 @@ def of_given(
     if found is None:
         return
     drive, per_input, reaching = found
+    entering = [_entering(drive, motion, values) for motion in fit.motions]
     for own in grid_of(effect, [], scales) if points is None else points:
-        columns, arrives = [], False
-        for motion, gain in zip(fit.motions, per_input, strict=True):
-            equations, p = motion.equations, motion.equations.parameters(values, motion.record)
-            along = equations.slopes_along(motion.z, motion.u, p)[drive.name]
-            given = equations.at_places(motion.z, motion.u, p)[f"signal@{drive.name}"]
-            reached = reaching(given, _speed(drive, motion, values), *own.values())
-            arrives |= bool(np.any(reached))
-            lost_force = gain * (given - reached)
-            columns.append(motion.thinned(along * lost_force)[None])
+        reached = [reaching(given, speed, *own.values()) for _, given, speed in entering]
+        columns = [
+            motion.thinned(along * gain * (given - through))[None]
+            for motion, gain, (along, given, _), through in zip(
+                fit.motions, per_input, entering, reached, strict=True
+            )
+        ]
         is_finite = all(np.all(np.isfinite(column)) for column in columns)
-        if is_finite and arrives and any(map(np.any, columns)):
+        if is_finite and any(map(np.any, reached)) and any(map(np.any, columns)):
             yield Term(effect, own, (), (), tuple(columns), (False,), is_given=True)
+
+
+def _entering(
+    drive: Drive, motion: RecordMotion, values: Mapping[str, float]
+) -> tuple[Floats, Floats, Floats]:
+    """Return how a drive enters the equations, shape (n_equations, n_samples), its signal, and the speed of its shaft."""
+    equations, p = motion.equations, motion.equations.parameters(values, motion.record)
+    along = equations.slopes_along(motion.z, motion.u, p)[drive.name]
+    given = equations.at_places(motion.z, motion.u, p)[f"signal@{drive.name}"]
+    return along, given, motion.along(equations.rig.mechanism.rate(drive.along), values)
 
 
 def _driving(
@@ -113,11 +122,6 @@ def _reaching(effect: Effect) -> Callable[..., Floats] | None:
     return compiled(effect.drive, (canonical.u, canonical.v, *own))
 
 
-def _speed(drive: Drive, motion: RecordMotion, values: Mapping[str, float]) -> Floats:
-    """Return the speed of the shaft of a drive, shape (n_samples,)."""
-    return motion.along(motion.equations.rig.mechanism.rate(drive.along), values)
-
-
 def lost(
     drive: Drive,
     effect: Effect,
@@ -129,10 +133,11 @@ def lost(
     """Return the force that a drive effect takes from what the motion requires, shape (n_equations, n_samples)."""
     gain, reaching = force_per_input(drive, {**values, **motion.record.constants}), _reaching(effect)
     assert reaching is not None
-    along, needed = _required(drive, gain, fit, motion, values)
-    return np.asarray(
-        along * gain * (needed - reaching(needed, _speed(drive, motion, values), *own.values()))
-    )
+    along, given, speed = _entering(drive, motion, values)
+    # Of a position drive that is another goal, and not another force.
+    _, missing = _through_drive(drive.name, motion, values, fit.residual(motion, values))
+    needed = motion.filtered(missing / gain + given)
+    return np.asarray(along * gain * (needed - reaching(needed, speed, *own.values())))
 
 
 def force_per_input(drive: Drive, numbers: Mapping[str, float]) -> float:
@@ -140,18 +145,6 @@ def force_per_input(drive: Drive, numbers: Mapping[str, float]) -> float:
     gain = derivative(drive.force, sp.Symbol(drive.name, real=True))
     known = {symbol.name for symbol in gain.free_symbols} <= numbers.keys()
     return float(evaluated(gain, numbers)) if known else 0.0
-
-
-def _required(
-    drive: Drive, gain: float, fit: EquationFit, motion: RecordMotion, values: Mapping[str, float]
-) -> tuple[Floats, Floats]:
-    """Return how a drive enters the equations, shape (n_equations, n_samples), and the signal that the motion requires of it."""
-    # Of a position drive that is another goal, and not another force.
-    equations = motion.equations
-    along, missing = _through_drive(drive.name, motion, values, fit.residual(motion, values))
-    p = equations.parameters(values, motion.record)
-    given = equations.at_places(motion.z, motion.u, p)[f"signal@{drive.name}"]
-    return along, motion.filtered(missing / gain + given)
 
 
 def _through_drive(
