@@ -100,7 +100,8 @@ def diagnosis_rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
         of_gap = f", {labels.share_label(cause)} of the squared gap" if cause.share > 0.0 else ""
         yield (
             labels.family_label(cause),
-            f"probability {labels.percent(cause.probability)}{of_gap}: {labels.forms_label(cause)}",
+            f"probability {labels.percent(cause.probability)}{of_gap}"
+            + (f": {labels.forms_label(cause)}" if cause.forms else "; no fit of it is a candidate"),
         )
     if diagnosis.candidates:
         yield "candidates", "; ".join(map(_candidate, diagnosis.candidates[:_RANKED]))
