@@ -88,8 +88,7 @@ class VerdictNumbers:
     )
     least_periods: float = assumption(
         3.0,
-        "Periods of a tone or a resonance in the longest record below which it is a slow force of any shape: its phase is free "
-        "in each record.",
+        "Periods of a tone in the longest record below which it is a slow force of any shape: its phase is free in each record.",
     )
     comparable: float = assumption(
         1.5,

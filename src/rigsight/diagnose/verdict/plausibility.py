@@ -101,8 +101,8 @@ def stands(model: FittedModel, reidentified: FittedModel, models: Sequence[Fitte
 
 def is_beyond_records(model: FittedModel, scales: Mapping[str, float], duration: float) -> bool:
     """Return True if an effect is slower, longer or coarser than the records can show: it is another spring."""
-    # Its wave is longer than the motion, a time constant longer than every record [s], its periods are too few in any of them, or
-    # the length over which it yields is beyond its search.
+    # Its wave is longer than the motion, a time constant or a period longer than every record [s], the periods of a tone are too few
+    # in each, or the length over which it yields is beyond its search.
     fit = model.fit
 
     def is_too_long(effect: Effect, parameter: Parameter) -> bool:
@@ -110,7 +110,8 @@ def is_beyond_records(model: FittedModel, scales: Mapping[str, float], duration:
         if parameter.dimension == "time":
             return value > duration
         if parameter.dimension == "time^-1":
-            return value * duration < 2.0 * math.pi * VERDICT.least_periods
+            least = VERDICT.least_periods if parameter.name == str(effect.pulsation) else 1.0
+            return value * duration < 2.0 * math.pi * least
         size = characteristic_value(placed_dimension(effect, parameter.dimension), scales)
         if parameter.name == effect.wave_number:
             return value < parameter.search[0] * size
