@@ -101,8 +101,8 @@ def stands(model: FittedModel, reidentified: FittedModel, models: Sequence[Fitte
 
 def is_beyond_records(model: FittedModel, scales: Mapping[str, float], duration: float) -> bool:
     """Return True if an effect is slower, longer or coarser than the records can show: it is another spring."""
-    # Its wave is longer than the motion, a time constant or a period longer than every record [s], the periods of a tone too few in
-    # each, or the length over which it yields beyond its search.
+    # Its wave is longer than the motion, its time constant or period longer than every record [s], or the length over which it
+    # yields beyond its search; or the periods of a tone are too few in each record.
     fit = model.fit
 
     def is_too_long(effect: Effect, parameter: Parameter) -> bool:
