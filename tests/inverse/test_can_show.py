@@ -7,9 +7,10 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.fit_context import candidates_on
-from rigsight.effects import CATALOGUE, effect_named, kind_of
+from rigsight.effects import CATALOGUE, Family, effect_named, kind_of
 from rigsight.inverse import propose
 from rigsight.records import Record
+from rigsight.rigs import AXIS, Rig
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
 
@@ -37,7 +38,7 @@ DT = 5e-3
     ],
 )
 def test_a_force_over_an_unknown_position_and_a_difference_of_directions_in_one_are_hidden(
-    rig, mean: float, hidden: set[str]
+    rig: Rig, mean: float, hidden: set[str]
 ) -> None:
     t = DT * np.arange(2000)
     u = mean + 0.3 * np.sin(3.0 * t)
@@ -45,6 +46,19 @@ def test_a_force_over_an_unknown_position_and_a_difference_of_directions_in_one_
     run = simulate(structure, VALUES, Record("run", DT, {"u": u}, {}, hold="foh"))
     found = propose(Campaign("motor", rig, {}, {}, (run,)), VALUES, candidates_on(rig, CATALOGUE))
     assert found is not None
-    asked = {*OF_POSITION, "directional_damping"}
+    asked = {*OF_POSITION, "directional_damping", "flexible_mode", "torque_ripple"}
     assert asked & set(map(kind_of, found.hidden)) == hidden
     assert found.taken[0].family == "dry_friction"
+
+
+def test_a_free_motion_that_is_read_later_is_another_one_of_the_same_equations() -> None:
+    t = DT * np.arange(2000)
+    values = {"gain": 1.0, "m": 1.0, "d": 0.5, "k": 100.0, "x_off": 0.0, "force_off": 0.0, "T_c": 0.5}
+    structure = compose(AXIS, [effect_named("coulomb_friction")])
+    run = simulate(structure, values, Record("decay", DT, {"u": 0.0 * t}, {}), np.array([0.3, 0.0]))
+    own = Campaign("axis", AXIS, {"gain": 1.0}, {}, (run,))
+    found = propose(own, values, candidates_on(AXIS, CATALOGUE))
+    assert found is not None
+    late = {e.name for e in candidates_on(AXIS, CATALOGUE) if e.family is Family.DELAY_OR_LAG}
+    assert late <= found.hidden
+    assert found.alone[0].family == "dry_friction"

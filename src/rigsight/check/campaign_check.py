@@ -105,6 +105,7 @@ class Check:
                     for (i, j), motion in m.motions.items()
                 ],
                 "not_judged": m.not_judged,
+                "hidden": m.hidden,
                 "reason": m.reason or None,
             },
         }

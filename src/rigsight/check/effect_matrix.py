@@ -47,6 +47,8 @@ class EffectMatrix:
         Of pairs that another motion tells apart, the first motion that does.
     not_judged
         Names of the effects that only fits of the simulation find.
+    hidden
+        Names of the effects that these records cannot show at any size.
     reason
         Why there is no matrix; empty where there is one.
     """
@@ -58,6 +60,7 @@ class EffectMatrix:
     told: tuple[tuple[Told, ...], ...] = ()
     motions: Mapping[tuple[int, int], str] = field(default_factory=dict)
     not_judged: tuple[str, ...] = ()
+    hidden: tuple[str, ...] = ()
     reason: str = ""
 
     @property
@@ -99,7 +102,8 @@ def effect_matrix(
         tuple(_VISIBLE[here.is_visible(i)] for i in range(len(judged))),
         tuple(map(tuple, told)),
         motions,
-        tuple(effect.name for effect in effects if effect.name not in named),
+        tuple(e.name for e in effects if e.name not in named and terms_of.can_show(e)),
+        tuple(e.name for e in effects if not terms_of.can_show(e)),
     )
 
 

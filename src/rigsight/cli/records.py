@@ -322,7 +322,7 @@ def _check_summary(found: Check) -> Group:
     from rich.console import Group
     from rich.markup import escape
 
-    from rigsight.report.check import check_headline, forms, rivals
+    from rigsight.report.check import check_headline, effect_names, forms, rivals
 
     findings = [(r.severity, f"{r.sentence} {r.remedy}") for r in found.remarks if r.severity != "note"]
     apart = []
@@ -331,6 +331,10 @@ def _check_summary(found: Check) -> Group:
         words += [f"{by}: {names}" for by, names in rival.others]
         apart.append((rival.effect, rival.where, "; ".join(words)))
     alike = [f"Forms of {family} that are not told apart: {names}." for family, names in forms(found.matrix)]
+    if found.matrix.hidden:
+        alike.append(
+            f"These records cannot show, at any size: {', '.join(effect_names(found.matrix.hidden))}."
+        )
     heads = ("Effect", "Where", "Not told apart from")
     effects = [table(heads, apart)] if apart else ["All families of effects can be told apart."]
     return Group(

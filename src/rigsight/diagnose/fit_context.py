@@ -10,7 +10,7 @@ import numpy as np
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.policy import HORIZON
-from rigsight.effects import Effect, Family, Place, placed
+from rigsight.effects import Effect, Place, placed
 from rigsight.effects import symbols as canonical
 from rigsight.identify import (
     DEFAULT_ACCURACY,
@@ -239,8 +239,6 @@ class FitContext:
         ]
 
     def _can_show(self, effect: Effect) -> bool:
-        if effect.family is Family.DELAY_OR_LAG and self._is_free_motion:
-            return False  # Read later, it is another motion of the same equations.
         if effect.place is not Place.ACTUATOR or not self.rig.inputs:
             return True
         place = self.rig.acts_at(effect)
@@ -250,13 +248,6 @@ class FitContext:
             return True
         records = (*self.estimation, *self.scoring)
         return any(not is_constant(record[name]) for record in records for name in reported)
-
-    @cached_property
-    def _is_free_motion(self) -> bool:
-        """Whether one coordinate moves by itself, and one sensor reads it."""
-        names = [signal.name for signal in self.rig.inputs]
-        still = all(is_constant(record[name]) for record in self.records for name in names if name in record)
-        return still and len(self.rig.mechanism.free) == 1 and len(self.rig.outputs) == 1
 
     def score(
         self,

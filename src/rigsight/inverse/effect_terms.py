@@ -15,7 +15,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from rigsight.effects import Effect, Place
+from rigsight.effects import Effect, Family, Place
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.errors import RigsightError
@@ -82,34 +82,27 @@ class EffectTerms:
         return EffectTerms(other, self.values, self.scales)
 
     def can_show(self, effect: Effect) -> bool:
-        """Return whether the motion can show an effect, as a term or not.
+        """Return whether the motion can show an effect, as a term or in a fit.
 
-        A force over a position needs one that a sensor or the equations know: with a free first one it is any constant force in
-        each record. A force that is even in the velocity needs both directions: in one it is that of an odd law.
+        A free motion that is read later is another one of the same equations. A force over a position needs one that a sensor or
+        the equations know: with a free first one it is any constant force in each record (one with a state is over the distance
+        from it). A force that is even in the velocity needs both directions: in one it is that of an odd law.
         """
-        if effect.place is not Place.DYNAMICS or effect.torque is None:
+        if effect.family is Family.DELAY_OR_LAG and self._is_free:
+            return effect.place is Place.SENSOR and self._is_redundant
+        if effect.place is not Place.DYNAMICS:
             return True
-        motions = self.fit.motions
-        if effect.reads(canonical.x) and all(m.is_integrated and not m.drifts for m in motions):
-            return False
-        if effect.states or effect.torque.free_symbols & {canonical.x, canonical.position}:
-            return True
-        if (
-            derivative(effect.torque, canonical.v) == 0
-            or effect.torque.xreplace({canonical.v: -canonical.v}) != effect.torque
-        ):
-            return True
-        return not all(_moves_one_way(moved) for moved in self._motion_of(effect))
+        if effect.reads(canonical.x) and not effect.states:
+            return any(motion.drifts or not motion.is_integrated for motion in self.fit.motions)
+        return not (_is_even(effect) and all(map(_moves_one_way, self._motion_of(effect))))
 
     def of(self, effect: Effect) -> Iterator[Term]:
         """Yield an effect at each point of the grid of its nonlinear parameters; nothing where it is no term.
 
         What one of more sensors than the motion needs does wrong shows beside the others, not in the equations.
         """
-        if effect.place is Place.SENSOR and self._is_redundant:
+        if not self.can_show(effect) or (effect.place is Place.SENSOR and self._is_redundant):
             return
-        if is_late(effect) and self._is_free:
-            return  # A free motion that is read later is another one of the same equations.
         if is_late(effect):
             yield from self._of_late(effect, self._lengths(effect))
         else:
@@ -259,6 +252,13 @@ class EffectTerms:
         if joint.name not in self._moved:
             self._moved[joint.name] = [joint_motion(m, joint, self.values) for m in self.fit.motions]
         return self._moved[joint.name]
+
+
+def _is_even(effect: Effect) -> bool:
+    """Return whether a force depends on the size of the velocity alone."""
+    law = effect.torque
+    turned = None if law is None else law.xreplace({canonical.v: -canonical.v})
+    return not effect.states and effect.reads(canonical.v) and turned == law
 
 
 def _moves_one_way(moved: JointMotion) -> bool:

@@ -82,6 +82,8 @@ def named_sizes(
     for effect in effects:
         if (effect.family, rig.where(effect)) in [key for key, _, _ in known]:
             found.append(_none(terms_of, effect, "These records show this family there already."))
+        elif not terms_of.can_show(effect):
+            found.append(_none(terms_of, effect, _HIDDEN))
         elif effect.name not in judged:
             found.append(_none(terms_of, effect, _NOT_ASKED))
         else:
@@ -90,6 +92,10 @@ def named_sizes(
     return found
 
 
+_HIDDEN = (
+    "These records cannot show it at any size: a delay of a free motion, a force over a position that nothing shows, or a "
+    "difference between directions of a motion in one."
+)
 _NOT_ASKED = (
     "Not judged along the motion: only fits of the simulation find resonances, tones, and errors of sensors of which there are "
     "more than the motion needs; what a drive would need beyond a limit was never logged."

@@ -80,11 +80,10 @@ def propose(
         variance = np.diag(covariance)
         weight = 1.0 / fit.tolerance(values, variance) ** 2
         by_noise = min(1.0, float(np.sum(variance * weight) / np.sum(fit.rms(values) ** 2 * weight)))
-    shown = [effect for effect in effects if terms_of.can_show(effect)]
-    selection = selection_of(terms_of, shown, variance)
+    selection = selection_of(terms_of, effects, variance)
     nothing = Proposal((), (), frozenset(), explained=0.0, by_chance=1.0)
     found = nothing if selection is None else selection.proposal(campaign.rig)
-    hidden = frozenset(effect.name for effect in effects if effect not in shown)
+    hidden = frozenset(effect.name for effect in effects if not terms_of.can_show(effect))
     return replace(found, hidden=hidden, noise=by_noise, forces=missing_forces(fit, values, covariance))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from rigsight.check import Check, EffectMatrix, Told, Visible
@@ -48,12 +48,18 @@ def render_check(found: Check, command: str, versions: Mapping[str, str]) -> str
         rivals=list(rivals(found.matrix)),
         forms=list(forms(found.matrix)),
         heads=[short_label(found.matrix, i) for i in range(len(found.matrix.effects))],
-        not_judged=sorted({effect_label(kind_of(effect)) for effect in found.matrix.not_judged}),
+        not_judged=effect_names(found.matrix.not_judged),
+        hidden=effect_names(found.matrix.hidden),
         headline=check_headline(found),
         signs=_SIGNS,
         told_words=TOLD_WORDS,
         classes={told: told.replace(" ", "-") for told in TOLD_WORDS},
     )
+
+
+def effect_names(effects: Iterable[str]) -> list[str]:
+    """Return the names of effects without their places, each once."""
+    return sorted({effect_label(kind_of(effect)) for effect in effects})
 
 
 def check_headline(found: Check) -> str:

@@ -14,7 +14,7 @@ from rigsight.diagnose.result import Diagnosis
 from rigsight.diagnose.search.screening import Shortlist
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.diagnose.search.worth_fitting import Search, search_places
-from rigsight.effects import CATALOGUE, Effect, Family, effect_named
+from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import characteristic_scales
 from rigsight.identify.fit.windows import liveliest
@@ -81,16 +81,6 @@ def test_the_true_one_is_looked_at_first_and_its_push_tells_its_size(
     assert parents & {effect.name for effect in offered} <= first
     for own, true in values.items():
         assert 0.5 < search.starts[name][own] / true < 2.0
-
-
-def test_delays_are_no_candidates_for_a_free_motion_that_one_sensor_reads() -> None:
-    t = DT * np.arange(N)
-    decay = Record("decay", DT, {"u": np.zeros(N), "x": np.exp(-t) * np.cos(20.0 * t)}, {})
-    scales = characteristic_scales(AXIS, [decay], VALUES)
-    context = FitContext(AXIS, (decay,), (decay,), (decay,), scales, {"x": NOISE}, frozenset(), VALUES)
-    offered = {effect.family for effect in context.offered(CATALOGUE)}
-    assert Family.DELAY_OR_LAG not in offered
-    assert Family.DRY_FRICTION in offered
 
 
 def test_no_push_claims_what_other_numbers_of_the_equations_take_away() -> None:
