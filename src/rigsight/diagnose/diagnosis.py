@@ -112,10 +112,13 @@ def diagnose(
     if any(floor.method == AT_REST for floor in found.floors) and _least_left(found) < VERDICT.refutes_rest:
         below_rest = _least_left(found)
         found = examine(campaign, effects, rng, n_jobs, say, prepare, memory, at_rest=False)
-    judgement = with_most_probable_family(found.judgement, campaign.rig, found.ranking, _families(found, rng))
-    found = replace(found, judgement=judgement)
+    families = _families(found, rng)
+    judgement = with_most_probable_family(found.judgement, campaign.rig, found.ranking, families)
+    if judgement is not found.judgement:
+        found = replace(found, judgement=judgement)
+        families = _families(found, rng)
     notes = verdict_notes(Basis(campaign, found, rng, below_rest))
-    diagnosis = _assembled(campaign, found, notes, rng)
+    diagnosis = _assembled(campaign, found, families, notes, rng)
     named = found.judgement.model if diagnosis.effects else found.reidentified
     if found.judgement.verdict != "unknown":
         diagnosis = with_own_errors(diagnosis, found.context, named, seed)
@@ -151,7 +154,11 @@ def _families(found: Examination, rng: np.random.Generator) -> tuple[FamilyAtPla
 
 
 def _assembled(
-    campaign: Campaign, found: Examination, notes: tuple[str, ...], rng: np.random.Generator
+    campaign: Campaign,
+    found: Examination,
+    families: tuple[FamilyAtPlace, ...],
+    notes: tuple[str, ...],
+    rng: np.random.Generator,
 ) -> Diagnosis:
     scored_on = "validation" if campaign.validation else "estimation"
     rig, context, before, reidentified = campaign.rig, found.context, found.before, found.reidentified
@@ -184,7 +191,6 @@ def _assembled(
     candidates = tuple(
         sorted((*with_effect, without_effect), key=lambda c: (-c.probability, c.error_over_noise))
     )
-    families = _families(found, rng)
     chosen = judgement.model.effects if is_effect else ()
     if judgement.by_motion:
         rivals = _other_families(rig, ranking.order, families, judgement.model)

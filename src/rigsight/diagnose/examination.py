@@ -136,7 +136,8 @@ def examine(
         judgement = by_motion(judgement, campaign.rig, reidentified, ranking, context.floors, proposal)
     quality = with_best_model(quality, context, judgement.model)
     quality = with_offsets_told(quality, context, judgement.model)
-    found = Examination(
+    say("adequacy")
+    return Examination(
         floors,
         context,
         models.alone.windowing,
@@ -150,9 +151,6 @@ def examine(
         models.alone.search.places,
         models.alone.proposal,
     )
-    _ = found.adequacy
-    say("adequacy")
-    return found
 
 
 def _floors(

@@ -27,6 +27,7 @@ INPUT_SATURATION = Effect(
     family=Family.DRIVE_LIMIT,
     summary="The drive cannot exceed a limit.",
     parameters=(
+        # Far beyond the inputs of a fit without it, which takes what the limit cuts off for a small gain of the drive.
         limit("u_max", "largest drive input", "input", lower=0.0, starts=(0.8, 0.4), search=(0.02, 50.0)),
     ),
     energy=Energy.ACTIVE,

@@ -274,9 +274,11 @@ def _outcome(truth: Truth, record: Record, clean: Record) -> Floats:
     contest = truth.contest
     errors = contest.remainder.errors(clean)
     against = [refitted(contest, rival, record, errors).against for rival in contest.rivals]
-    # Where a joint sticks the cost has many minima; that of the truth is near its own numbers.
-    near = refitted(contest, contest.rivals[truth.index], record, errors, truth.rival.fit.values).against
-    against[truth.index] = min(against[truth.index], near)
+    index = truth.index
+    if truth.rival is not contest.rivals[index]:
+        # Where a joint sticks the cost has many minima; that of drawn numbers is near them.
+        near = refitted(contest, contest.rivals[index], record, errors, truth.rival.fit.values)
+        against[index] = min(against[index], near.against)
     return posterior([rival.probability for rival in contest.rivals], against)
 
 

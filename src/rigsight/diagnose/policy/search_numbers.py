@@ -92,7 +92,7 @@ class SearchNumbers:
         "If there are more starts, number of those fitted at length in pieces, the best after the very short fit first.",
         "hysteresis by sliders, five draws of noise: two to five of nine very short fits led to the best result",
     )
-    larger_gain: float = budget(
+    larger_gain: float = assumption(
         10.0,
         "Factor of the gain of a drive in a further start beside a limit: a fit without the limit takes what it cuts off for "
         "a small gain.",
