@@ -29,22 +29,25 @@ DT = 5e-3
 
 
 @pytest.mark.parametrize(
-    ("rig", "mean", "hidden"),
+    ("rig", "means", "hidden"),
     [
-        (SHOWS_ANGLE, 0.0, set()),
-        (SHOWS_ANGLE, 0.5, {"directional_damping"}),
-        (SHOWS_SPEED, 0.0, OF_POSITION),
-        (SHOWS_SPEED, 0.5, {*OF_POSITION, "directional_damping"}),
+        (SHOWS_ANGLE, (0.0,), set()),
+        (SHOWS_ANGLE, (0.5, 0.6), {"directional_damping"}),
+        (SHOWS_ANGLE, (0.5, -0.5), set()),
+        (SHOWS_SPEED, (0.0,), OF_POSITION),
+        (SHOWS_SPEED, (0.5,), {*OF_POSITION, "directional_damping"}),
     ],
 )
 def test_a_force_over_an_unknown_position_and_a_difference_of_directions_in_one_are_hidden(
-    rig: Rig, mean: float, hidden: set[str]
+    rig: Rig, means: tuple[float, ...], hidden: set[str]
 ) -> None:
     t = DT * np.arange(2000)
-    u = mean + 0.3 * np.sin(3.0 * t)
-    structure = compose(rig, [effect_named("coulomb_friction")])
-    run = simulate(structure, VALUES, Record("run", DT, {"u": u}, {}, hold="foh"))
-    found = propose(Campaign("motor", rig, {}, {}, (run,)), VALUES, candidates_on(rig, CATALOGUE))
+    structure, wave = compose(rig, [effect_named("coulomb_friction")]), 0.3 * np.sin(3.0 * t)
+    runs = [
+        simulate(structure, VALUES, Record(f"run {mean}", DT, {"u": mean + wave}, {}, hold="foh"))
+        for mean in means
+    ]
+    found = propose(Campaign("motor", rig, {}, {}, tuple(runs)), VALUES, candidates_on(rig, CATALOGUE))
     assert found is not None
     asked = {*OF_POSITION, "directional_damping", "flexible_mode", "torque_ripple"}
     assert asked & set(map(kind_of, found.hidden)) == hidden

@@ -94,7 +94,7 @@ class EffectTerms:
             return True
         if effect.reads(canonical.x) and not effect.states:
             return any(motion.drifts or not motion.is_integrated for motion in self.fit.motions)
-        return not (_is_even(effect) and all(map(_moves_one_way, self._motion_of(effect))))
+        return not _is_even(effect) or _moves_both_ways(self._motion_of(effect))
 
     def of(self, effect: Effect) -> Iterator[Term]:
         """Yield an effect at each point of the grid of its nonlinear parameters; nothing where it is no term.
@@ -261,9 +261,10 @@ def _is_even(effect: Effect) -> bool:
     return not effect.states and effect.reads(canonical.v) and turned == law
 
 
-def _moves_one_way(moved: JointMotion) -> bool:
-    least = speed_at_rest(moved.v)
-    return bool(np.all(moved.v > -least) or np.all(moved.v < least))
+def _moves_both_ways(motions: Sequence[JointMotion]) -> bool:
+    """Return whether a joint moves in both directions, in one record or in several."""
+    ways = {sign for m in motions for sign in (-1.0, 1.0) if np.any(sign * m.v > speed_at_rest(m.v))}
+    return len(ways) > 1
 
 
 def _of_joint(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fit_context import FitContext, fit_context_of
+from rigsight.diagnose.fit_context import FitContext, candidates_on, fit_context_of
 from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.single_effects import fit_candidate, reidentify
 from rigsight.diagnose.search.starts import start_values
@@ -16,6 +16,10 @@ from rigsight.identify.fit.windows import Windowing
 from rigsight.records import Record
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
+
+from ...inverse.test_drive_gain import PAYLOAD
+from ...inverse.test_drive_gain import SERVO as WEIGHED_SERVO
+from ...inverse.test_proposal import campaign
 
 SERVO = rig_of_text(
     """
@@ -83,3 +87,15 @@ def test_the_limit_of_a_drive_that_is_nearly_always_in_it_is_found(context: FitC
     found = fit_candidate(context, (LIMIT,), base.fit)
     assert found.error_over_noise < 1.2
     assert found.fit.values["u_max"] == pytest.approx(VALUES["u_max"], rel=0.02)
+
+
+def test_a_limit_of_what_drives_a_gain_is_smaller_where_the_gain_is_larger() -> None:
+    limit, names = effect_named("input_saturation"), {**PAYLOAD, "J": 2e-3, "k_v": 0.6, "d": 0.02}
+    own = campaign(WEIGHED_SERVO, names, [], (0.3, 0.5))
+    context = fit_context_of(own, {"angle": NOISE}, Windowing(), None, IdleThreads(1), names)
+    (placed_limit,) = candidates_on(WEIGHED_SERVO, [limit])
+    base = reidentify(context, context.start).fit
+    structure = context.simplest((placed_limit,), base.structure)
+    first, *_, last = start_values(context, structure, placed_limit, base, {})
+    assert last["k_v"] == pytest.approx(SEARCH.larger_gain * first["k_v"])
+    assert last["k_v"] * last["u_max"] == pytest.approx(first["k_v"] * first["u_max"])
