@@ -89,6 +89,7 @@ class VerdictNumbers:
     least_periods: float = assumption(
         3.0,
         "Periods of a tone in the longest record below which it is a slow force of any shape: its phase is free in each record.",
+        "seen on one measured pendulum, whose damping was called a tone of one and a half periods",
     )
     comparable: float = assumption(
         1.5,

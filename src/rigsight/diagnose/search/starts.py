@@ -224,16 +224,16 @@ def start_values(
         yield from waves or starts
         return
     yield from starts
-    yield from _with_larger_gain(context, structure, effect, starts[:1])
+    yield from _with_larger_gain(context, structure, effect, starts[0])
     line = _persistent_line(context, base) if effect.pulsation is not None else None
     if line is not None:
         yield {**starts[0], structure.parameter_name(effect, str(effect.pulsation)): line}
 
 
 def _with_larger_gain(
-    context: FitContext, structure: Structure, effect: Effect, starts: Sequence[dict[str, float]]
+    context: FitContext, structure: Structure, effect: Effect, start: Mapping[str, float]
 ) -> Iterator[dict[str, float]]:
-    """Yield starts of a limit of a drive at a larger gain, with the same limit of its force."""
+    """Yield a start of a limit of a drive at a larger gain, with the same limit of its force."""
     limits = [p.name for p in effect.parameters if p.null is not None and p.null >= ENDLESS]
     if effect.place is not Place.ACTUATOR or not limits:
         return
@@ -241,11 +241,9 @@ def _with_larger_gain(
     for gain, drive in gains_of_drives(context.rig).items():
         if drive.name == context.rig.acts_at(effect) and gain in free:
             of_force = 1.0 if sp.Symbol(gain, real=True) in drive.signal.free_symbols else SEARCH.larger_gain
-            for start in starts:
-                limited = {
-                    n: start[n] / of_force for n in (structure.parameter_name(effect, p) for p in limits)
-                }
-                yield {**start, **limited, gain: SEARCH.larger_gain * start[gain]}
+            names = [structure.parameter_name(effect, limit) for limit in limits]
+            limited = {name: start[name] / of_force for name in names}
+            yield {**start, **limited, gain: SEARCH.larger_gain * start[gain]}
 
 
 def _persistent_line(context: FitContext, base: FitResult) -> float | None:

@@ -113,9 +113,8 @@ class WorthFitting:
     named: tuple[Effect, ...] = ()  # of those alone the ones of families that the motion names
     # Whether the motion shows every force that matters: a family that it rules out is not the main cause.
     is_shown: bool = False
-    undecided: frozenset[str] = (
-        frozenset()
-    )  # names of effects that only fits can judge beside the gain of their drive
+    # Names of effects that only fits can judge beside the gain of their drive.
+    undecided: frozenset[str] = frozenset()
     explained: float = 0.0  # share of the missing force that one family explains, or all that were taken
     # Of effects by their names: where they explain most of the missing force along the motion.
     starts: Mapping[str, ProposedStart] = field(default_factory=dict)
