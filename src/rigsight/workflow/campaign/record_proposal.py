@@ -127,15 +127,17 @@ def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig]) -> Proposal:
         lines += ["[records.columns]", *columns]
     stretches = tuple(_stretches(guess)) if is_log else ()
     inputs = [one.channel for one in guess.signals[: len(guess.rig.inputs)]]
-    is_held = bool(inputs) and all(one is not None and _is_held(as_floats(one.load())) for one in inputs)
+    is_asked = bool(inputs) and not is_log  # Of a log of a robot the hold is known.
+    is_held = is_asked and all(one is not None and _is_held(as_floats(one.load())) for one in inputs)
     return Proposal(path.name, guess, tuple(lines), timing_blanks + column_blanks, stretches, is_held)
 
 
 def _is_held(samples: Floats) -> bool:
-    steps = np.abs(np.diff(samples[np.isfinite(samples)]))
+    known = samples[np.isfinite(samples)]
+    steps = np.abs(np.diff(known))
     if not np.any(steps) or np.mean(steps == 0.0) < _REPEATED:
         return False
-    return bool(np.median(steps[steps > 0.0]) >= _JUMP * np.ptp(samples[np.isfinite(samples)]))
+    return bool(np.median(steps[steps > 0.0]) >= _JUMP * np.ptp(known))
 
 
 def _stretches(guess: FileGuess) -> list[tuple[float, float]]:
