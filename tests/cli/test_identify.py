@@ -53,7 +53,6 @@ def test_identify_says_nothing_if_quiet(axis_campaign: Path, tmp_path: Path, run
         (["--objective", "free-run", "--initial-samples", "1"], "--initial-samples"),
         (["--objective", "free-run", "--initial-samples", "99999"], "--initial-samples"),
         (["--effect", "bouc_wen"], "Did you mean 'bouc_wen_hysteresis'"),
-        (["--effect", "cubic_stiffness"], "name one that does: bouc_wen_hysteresis"),
         (["--effect", "bouc_wen_hysteresis", "--effect", "iwan_hysteresis"], "name one of them"),
     ],
 )

@@ -62,7 +62,7 @@ def identify(
     effect: Annotated[
         list[str] | None,
         options.effect(
-            "Calibrate the rig with this effect as well; one with memory, such as bouc_wen_hysteresis. May be repeated.",
+            "Fit this effect as well, such as coulomb_friction@gearbox. May be repeated.",
             "the rig's own equations",
         ),
     ] = None,

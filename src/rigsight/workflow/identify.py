@@ -20,7 +20,7 @@ from rigsight.rigs import Rig
 from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.identification.figures import amplitudes_figure, identification_figures, view_figure
-from rigsight.workflow.identification.hysteresis import structure_with_memory, with_hysteresis
+from rigsight.workflow.identification.hysteresis import has_hysteresis, structure_with_memory, with_hysteresis
 from rigsight.workflow.identification.json import identification_json
 from rigsight.workflow.identification.rig import identify_rig
 from rigsight.workflow.own.own_effects import effects_on
@@ -51,9 +51,9 @@ def run_identify(
     listener: Listener = silent,
     command: str | None = None,
 ) -> Identification:
-    """Identify the rig behind the estimation records of a campaign, with the effects that its simulation has.
+    """Identify the rig behind the estimation records of a campaign, with the effects that its simulation has and `effects`.
 
-    The rig with effects of memory is calibrated as well if some are named.
+    Of one motion on a spring, effects with a memory are calibrated after the rig alone was identified.
     """
     options = checked_options(method, resolution, objective, initial_samples)
     jobs = checked_jobs(n_jobs)
@@ -114,33 +114,33 @@ def identify_campaign(
     seed: int = 0,
 ) -> Identification:
     """Identify each estimation record, then all of them together, and score the validation records."""
-    if seed and not effects:
-        raise InputError(
-            f"Only the calibration of effects draws random numbers, so the seed {seed} would change nothing. Leave it out, or "
-            "name an effect (--effect)."
-        )
     if options.method == "thesis" and not campaign.rig.is_driven:
         raise InputError(
             f"The method 'thesis' fits rigs whose input moves a mass, and that of {campaign.rig.name} prescribes the motion. Use "
             "--method local_rational."
         )
-    if options.starting_samples and effects:
+    asked = effects_on(campaign.rig, effects, "--effect")
+    # The numbers of an effect that is asked for are fitted anew, also where the given simulation has it.
+    names = {effect.name for effect in asked}
+    known = tuple(effect for effect in campaign.modelled if effect.name not in names)
+    is_hysteresis = has_hysteresis(campaign, asked)
+    if seed and not is_hysteresis:
+        raise InputError(
+            f"Only the calibration of a hysteresis draws random numbers, so the seed {seed} would change nothing. Leave it out, "
+            "or name an effect with memory (--effect)."
+        )
+    if options.starting_samples and is_hysteresis:
         raise InputError(
             "The calibration of an effect with memory fits the initial states, so --effect has no --objective free-run. Name the "
             "effect in the campaign instead: effects = [...] under [rig]."
         )
     report_notes(campaign.notes, listener)
-    campaign = _free_run(campaign, options.starting_samples)
-    structure = structure_with_memory(campaign, effects) if effects else None
-    # The rig is identified without the effects that are calibrated, also where its simulation has one of them already.
-    asked = {effect.name for effect in effects_on(campaign.rig, effects, "--effect")}
-    campaign = replace(
-        campaign, modelled=tuple(effect for effect in campaign.modelled if effect.name not in asked)
-    )
-    identification = identify_rig(campaign, options, n_jobs, listener)
-    identification = replace(identification, given=campaign.given)
-    if structure is None:
-        return identification
+    campaign = replace(_free_run(campaign, options.starting_samples), modelled=known)
+    if not is_hysteresis:
+        campaign = replace(campaign, modelled=(*known, *asked))
+        return replace(identify_rig(campaign, options, n_jobs, listener, asked), given=campaign.given)
+    structure = structure_with_memory(campaign, asked)
+    identification = replace(identify_rig(campaign, options, n_jobs, listener), given=campaign.given)
     return with_hysteresis(identification, campaign, structure, seed, n_jobs, listener)
 
 

@@ -1,8 +1,9 @@
-"""Effects that the given simulation has belong to the rig that is identified, whatever its kind."""
+"""Effects of the given simulation, and those that are asked for, are identified with the rig, whatever its kind."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,12 +11,14 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
+from rigsight.effects import CATALOGUE, effect_named, placed
 from rigsight.identify.identification import Identification
 from rigsight.records import Record
 from rigsight.workflow.campaign.in_memory import make_campaign, make_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.identification.json import identification_json
 from rigsight.workflow.identify import checked_options, identify_campaign
+from rigsight.workflow.own.own_effects import effect_on
 from rigsight.workflow.simulate import simulate_model
 
 DT = 5e-3
@@ -108,6 +111,56 @@ def test_the_parameters_of_rig_and_effect_are_found_together(case: Case) -> None
     effect_parameters = found.model["effect_parameters"]
     assert effect_parameters.keys() <= content["joint"]["parameters"].keys()
     assert effect_parameters.keys() <= content["records"][0]["parameters"].keys()
+
+
+@pytest.mark.parametrize(
+    ("case", "asked"),
+    [
+        (CASES[0], "coulomb_friction"),
+        (CASES[0], "coulomb_friction@dynamics"),
+        (CASES[1], "input_delay"),
+        (CASES[2], "coulomb_friction"),
+        pytest.param(CASES[-1], "coulomb_friction@motor_bearing", marks=pytest.mark.slow),
+    ],
+    ids=lambda value: value if isinstance(value, str) else value.rig,
+)
+def test_an_effect_is_fitted_without_given_numbers(case: Case, asked: str) -> None:
+    campaign = recorded(case)
+    own = effect_on(campaign.rig, case.effect, {e.name: e for e in CATALOGUE}, "the case")
+    unknown = {p.name for p in own.parameters}
+    campaign = replace(
+        campaign,
+        modelled=(),
+        parameters={name: value for name, value in campaign.parameters.items() if name not in unknown},
+    )
+    effect = effect_named(asked.partition("@")[0])
+    if "@" in asked:
+        effect = placed(effect, asked.partition("@")[2])
+    found = identify_campaign(campaign, BY_DEFAULT, effects=[effect])
+    fit = found.joint.fit.fit
+    for name in (name for name in case.truth if name not in campaign.constants):
+        assert abs(fit.values[name] - case.truth[name]) < 4.0 * fit.standard_errors[name] < np.inf, name
+    assert found.hysteresis is None
+    assert len(found.model["effects"]) == 1
+
+
+def test_numbers_of_an_effect_that_is_asked_for_are_fitted_anew() -> None:
+    campaign = recorded(CASES[0])
+    far = replace(campaign, parameters={**campaign.parameters, "T_c": 50.0})
+    found = identify_campaign(far, BY_DEFAULT, effects=[effect_named("coulomb_friction")])
+    assert found.joint.fit.fit.values["T_c"] == pytest.approx(CASES[0].truth["T_c"], rel=0.05)
+
+
+def test_an_effect_begins_at_the_fit_of_a_simpler_one_beside_those_of_the_simulation() -> None:
+    campaign = recorded(CASES[0])
+    (friction,) = campaign.modelled
+    alone = replace(campaign, modelled=())
+    found = identify_campaign(alone, BY_DEFAULT, effects=[effect_named("stribeck_friction")])
+    simpler = identify_campaign(alone, BY_DEFAULT, effects=[friction])
+    assert found.joint.fit.noise["x"] <= simpler.joint.fit.noise["x"]
+    both = identify_campaign(campaign, BY_DEFAULT, effects=[effect_named("input_delay")])
+    assert sorted(both.model["effects"]) == ["coulomb_friction", "input_delay"]
+    assert both.joint.fit.fit.values["T_c"] == pytest.approx(CASES[0].truth["T_c"], rel=0.01)
 
 
 def test_effects_take_the_transfer_function_and_leave_the_response() -> None:

@@ -5,14 +5,16 @@ At a size of zero, the derivatives say little about where the minimum lies.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 
 import sympy as sp
 
 from rigsight.effects import Effect, placed_dimension
 from rigsight.effects import symbols as canonical
+from rigsight.identify.fit.fit_data import FitResult
 from rigsight.rigs import Rig, evaluated, joint_of
-from rigsight.simulate import Structure
+from rigsight.simulate import Structure, carried_over
 from rigsight.units import characteristic_value
 
 _INSIDE = 0.1
@@ -30,6 +32,53 @@ def off_bounds(
         for share in (p.starts or (_INSIDE,))[:1]
     }
     return {**values, **moved} if moved else None
+
+
+def declared_starts(
+    structure: Structure,
+    effect: Effect,
+    scales: Mapping[str, float],
+    base: FitResult,
+    parents: Mapping[str, FitResult],
+) -> Iterator[dict[str, float]]:
+    """Yield the start values that an effect declares, beside the fit without it or with one of the effects that it contains."""
+    fitted = [p for p in effect.parameters if p.fitted and p.name not in effect.special_cases]
+    rest = {p.name: p.default for p in effect.parameters if p not in fitted and p.default is not None}
+    rest |= {
+        p.name: p.held_at(characteristic_value(placed_dimension(effect, p.dimension), scales))
+        for p in effect.parameters
+        if not p.fitted
+    }
+    if effect.starts:
+        for start in effect.starts:
+            origin = base if start.parent is None else parents.get(start.parent)
+            if origin is not None and start.parent != effect.name:
+                own = declared_values(
+                    structure.rig, effect, start.values, _known(origin, start.parent), scales
+                )
+                yield with_own_values(structure, effect, origin, {**rest, **own})
+        return
+    sizes = [characteristic_value(placed_dimension(effect, p.dimension), scales) for p in fitted]
+    for combination in itertools.product(*(p.starts for p in fitted)):
+        own = {p.name: c * size for p, c, size in zip(fitted, combination, sizes, strict=True)}
+        yield with_own_values(structure, effect, base, {**rest, **own})
+
+
+def _known(origin: FitResult, parent: str | None) -> dict[str, float]:
+    """Return the values that a start's formulas may use: the rig's, and the parent effect's by their own names."""
+    values = dict(origin.values)
+    for effect in origin.structure.effects:
+        if effect.name == parent:
+            values |= origin.structure.values_of(effect, origin.values)
+    return values
+
+
+def with_own_values(
+    structure: Structure, effect: Effect, origin: FitResult, own: Mapping[str, float]
+) -> dict[str, float]:
+    """Return the values of a fit for a structure with an effect more, with own values of that effect and of the rig."""
+    carried = carried_over(origin.values, origin.structure, structure)
+    return {**carried, **in_structure(structure, effect, own)}
 
 
 def declared_values(

@@ -368,7 +368,8 @@ def _parameters(where: Where, structure: Structure, given: Mapping[str, float]) 
             if parameter.default is None:
                 raise InputError(
                     f"{where.at('rig', 'parameters', parameter.name)}: is missing; the effects of the given simulation "
-                    f"need it ({parameter.description} [{parameter.unit}]). Give its value, or remove the effect."
+                    f"need it ({parameter.description} [{parameter.unit}]). Give its value, or remove the effect and fit it: "
+                    "'rigsight identify CAMPAIGN --effect NAME'."
                 )
             checked[parameter.name] = parameter.default
     for effect in structure.effects:

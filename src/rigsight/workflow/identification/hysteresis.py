@@ -9,7 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
-from rigsight.effects import CATALOGUE, Effect, Place
+from rigsight.effects import Effect, Place
 from rigsight.errors import InputError
 from rigsight.identify import FitResult, GreyBoxFit, calibrate_to_records, characteristic_scales
 from rigsight.identify.hysteresis.calibration import free_parameters, special_structure
@@ -21,7 +21,6 @@ from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.model import Model
 from rigsight.workflow.identification.joint import errors_by_output
-from rigsight.workflow.own.own_effects import effects_on
 from rigsight.workflow.run.kernels import prepare_kernels
 from rigsight.workflow.run.progress import Listener, Stage, Step
 
@@ -32,37 +31,23 @@ _HARDLY = 0.9
 """Share of the error from which effects are said to explain hardly anything."""
 
 
+def has_hysteresis(campaign: Campaign, effects: Sequence[Effect]) -> bool:
+    """Return True if effects give the spring of one mass or element a memory."""
+    rig = campaign.rig
+    if not rig.has_one_motion or campaign.drifts or rig.motion.stiffness == 0:
+        return False
+    return any(_has_memory(effect) for effect in effects)
+
+
 def structure_with_memory(campaign: Campaign, effects: Sequence[Effect]) -> Structure:
     """Return the rig with these effects and those that the campaign's simulation has already."""
-    rig = campaign.rig
-    names = " ".join(f"--effect {effect.name}" for effect in effects)
-    folder = "CAMPAIGN" if campaign.folder is None else campaign.folder
-    instead = f"'rigsight diagnose {folder} {names}' fits effects to any rig."
-    if not rig.has_one_motion:
-        raise InputError(
-            f"--effect calibrates effects with a memory, on the built-in rigs of one motion; {rig.name} is none of them. "
-            f"{instead}"
-        )
-    if campaign.drifts or rig.motion.stiffness == 0:
-        raise InputError(
-            f"--effect calibrates effects with a memory where a spring brings the rig back, and this {rig.name} has none. "
-            f"{instead}"
-        )
-    chosen = effects_on(rig, effects, "--effect")
-    if not any(_has_memory(effect) for effect in chosen):
-        known = ", ".join(effect.name for effect in CATALOGUE if _has_memory(effect) and rig.offers(effect))
-        raise InputError(
-            f"None of the effects ({', '.join(effect.name for effect in chosen)}) gives the spring a memory; name one that does: "
-            f"{known}. 'rigsight diagnose {folder} {names}' fits the others alone."
-        )
-    beside = [effect for effect in campaign.modelled if all(effect.name != one.name for one in chosen)]
-    of_spring = [effect.name for effect in (*beside, *chosen) if effect.spring is not None and effect.states]
+    of_spring = [e.name for e in (*campaign.modelled, *effects) if e.spring is not None and e.states]
     if len(of_spring) > 1:
         raise InputError(
             f"The records do not tell {' and '.join(of_spring)} of the same spring apart; name one of them, then compare the "
             "models."
         )
-    return compose(rig, (*beside, *chosen))
+    return compose(campaign.rig, (*campaign.modelled, *effects))
 
 
 def with_hysteresis(

@@ -165,7 +165,7 @@ def _leaves_motion(relative: float, samples: Floats) -> bool:
 
 def _statement(fit: JointFit, scores: Sequence[RecordScore], fitted: Sequence[Record]) -> str:
     if not fit.fit.success:
-        return f"The joint fit did not converge: {fit.fit.message}. Its parameter values are not reliable."
+        return f"The joint fit did not converge: {fit.fit.message.rstrip('.')}. Its parameter values are not reliable."
     if len(fitted) < 2:
         return (
             "Only one estimation record was fitted, so its parameters cannot be compared with others. Another kind of record, "

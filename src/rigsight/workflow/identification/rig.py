@@ -10,6 +10,7 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign, with_weighed_spring
+from rigsight.effects import Effect
 from rigsight.errors import RigsightError, SimulationError, check_option
 from rigsight.identify import (
     FitResult,
@@ -17,7 +18,6 @@ from rigsight.identify import (
     OpenFactor,
     characteristic_scales,
     linear_start,
-    off_bounds,
     swallowed_by_offsets,
 )
 from rigsight.identify.amplitude_dependence import amplitude_dependence
@@ -45,6 +45,7 @@ from rigsight.simulate import Structure, compose
 from rigsight.simulate.linearization import Linearization
 from rigsight.simulate.model import Model
 from rigsight.workflow.identification.joint import UNSERVED, held_parameters, identify_jointly
+from rigsight.workflow.identification.start_with_effects import start_with_effects
 from rigsight.workflow.identification.warnings import (
     beyond_identified_amplitudes,
     identification_warnings,
@@ -69,9 +70,13 @@ def _has_forms(campaign: Campaign) -> bool:
 
 
 def identify_rig(
-    campaign: Campaign, options: EstimationOptions, n_jobs: int, listener: Listener
+    campaign: Campaign,
+    options: EstimationOptions,
+    n_jobs: int,
+    listener: Listener,
+    asked: Sequence[Effect] = (),
 ) -> Identification:
-    """Identify a rig by the estimation records of a campaign."""
+    """Identify a rig by the estimation records of a campaign; `asked` are those of its effects that have no given numbers."""
     campaign = with_weighed_spring(campaign)
     rig, structure = campaign.rig, compose(campaign.rig, campaign.modelled)
     if not rig.has_one_motion:
@@ -108,7 +113,7 @@ def identify_rig(
         windows = cut(records, length)
         # The search for a start knows terms of motions, and levels alone have none.
         if campaign.modelled or not rig.mechanism.coordinates:
-            start = start_with_effects(campaign, windows, start, held, _sizes(rig, windows))
+            start = start_with_effects(campaign, asked, windows, start, held, _sizes(rig, windows))
         # Parameters that cannot be distinguished from sensor offsets that are free in each record.
         values = {**campaign.constants, **start}
         scales = characteristic_scales(rig, windows, values)
@@ -325,23 +330,3 @@ def _views(
         except SimulationError:
             continue
     return views
-
-
-def start_with_effects(
-    campaign: Campaign,
-    windows: Sequence[Record],
-    start: Mapping[str, float],
-    held: Mapping[str, float],
-    sizes: Mapping[str, float],
-) -> dict[str, float]:
-    """Return the parameters of the best of several fits: from the given values, and from inside of bounds at which they lie."""
-    structure = compose(campaign.rig, campaign.modelled)
-    begin = {**campaign.constants, **start, **held}
-    scales = characteristic_scales(campaign.rig, windows, begin)
-    fixed = {*held, *campaign.constants}
-    free = [p.name for p in structure.parameters if p.fitted and p.name not in fixed]
-    problem = GreyBoxFit(structure, windows, scales, sizes)
-    given = {**begin, **campaign.given, **held}
-    starts = [given, {**given, **begin}]
-    starts += [inside for own in starts if (inside := off_bounds(structure, own, free, scales)) is not None]
-    return min((problem.fit(own, free) for own in starts), key=lambda fit: fit.cost).values
