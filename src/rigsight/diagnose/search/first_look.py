@@ -21,9 +21,10 @@ import numpy as np
 
 from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.policy import SEARCH
-from rigsight.diagnose.search.starts import start_values, with_own_values
+from rigsight.diagnose.search.starts import start_values
 from rigsight.effects import Effect
 from rigsight.identify import FitResult
+from rigsight.identify.start.declared_starts import with_own_values
 from rigsight.records.record import Floats
 from rigsight.simulate import Structure
 

@@ -17,10 +17,11 @@ from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.first_look import FirstLook, look_at, widened
 from rigsight.diagnose.search.screening import structures_of_shortlist
 from rigsight.diagnose.search.single_effects import followed
-from rigsight.diagnose.search.starts import start_values, with_own_values
+from rigsight.diagnose.search.starts import start_values
 from rigsight.diagnose.search.worth_fitting import search_places
 from rigsight.effects import Effect
 from rigsight.identify import FitResult
+from rigsight.identify.start.declared_starts import with_own_values
 from rigsight.inverse import Proposal, ProposedCause, ProposedStart
 from rigsight.simulate import Structure, carried_over
 

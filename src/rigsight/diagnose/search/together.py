@@ -26,8 +26,9 @@ from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.first_look import FirstLook, started_from, widened
 from rigsight.diagnose.search.screening import Response, Shortlist, scaled
 from rigsight.diagnose.search.single_effects import followed
-from rigsight.diagnose.search.starts import start_values, with_own_values
+from rigsight.diagnose.search.starts import start_values
 from rigsight.effects import Effect
+from rigsight.identify.start.declared_starts import with_own_values
 from rigsight.records.record import Floats
 
 _DEPENDENT = 1e-6

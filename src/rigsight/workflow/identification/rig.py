@@ -117,8 +117,8 @@ def identify_rig(
         # Parameters that cannot be distinguished from sensor offsets that are free in each record.
         values = {**campaign.constants, **start}
         scales = characteristic_scales(rig, windows, values)
-        asked = [p.name for p in rig.parameters if p.name not in held]
-        swallowed = swallowed_by_offsets(structure, windows, scales, _sizes(rig, windows), values, asked)
+        sought = [p.name for p in rig.parameters if p.name not in held]
+        swallowed = swallowed_by_offsets(structure, windows, scales, _sizes(rig, windows), values, sought)
         held |= {name: start[name] for name in swallowed}
         joint = identify_jointly(campaign, structure, found, start, held, length)
         stage.finished("one set for all records")
