@@ -27,11 +27,21 @@ def gains_of_known_scale(rig: Rig) -> dict[str, list[bool]]:
     along = {name: drive.along.free_symbols for name, drive in gains_of_drives(rig).items()}
     if not along:
         return {}
-    numbers = {sp.Symbol(p.name, real=True): sp.Integer(0) for p in rig.parameters}
-    known = (mechanism.kinetic + mechanism.potential).xreplace(numbers)
-    scaled = set() if known.has(sp.zoo, sp.nan) else known.free_symbols
+    scaled = _known_part(rig, mechanism.kinetic + mechanism.potential).free_symbols
     moved = {c.symbol for c in mechanism.free if {c.symbol, c.rate} & scaled}
     return {name: [c.symbol in own for c in mechanism.free] for name, own in along.items() if own & moved}
+
+
+def weighed(rig: Rig) -> NDArray[np.bool_]:
+    """Return for each equation whether a known weight or spring enters it, shape (n_coordinates,)."""
+    known = _known_part(rig, rig.mechanism.potential)
+    return np.array([derivative(known, c.symbol) != 0 for c in rig.mechanism.free], dtype=np.bool_)
+
+
+def _known_part(rig: Rig, energy: sp.Expr) -> sp.Expr:
+    """Return an energy where all parameters are zero; zero if it has no value there."""
+    known = energy.xreplace({sp.Symbol(p.name, real=True): sp.Integer(0) for p in rig.parameters})
+    return sp.Integer(0) if known.has(sp.zoo, sp.nan) else known
 
 
 def gains_of_drives(rig: Rig) -> dict[str, Drive]:

@@ -10,7 +10,7 @@ from scipy.optimize import lsq_linear
 
 from rigsight.effects import Effect, symbols
 from rigsight.errors import SimulationError
-from rigsight.inverse.drive_gain import changed, gains_of_known_scale
+from rigsight.inverse.drive_gain import changed, gains_of_known_scale, weighed
 from rigsight.inverse.joint_force import JointMotion, effect_force, joint_motion
 from rigsight.inverse.measured_motion import RecordMotion, record_motion
 from rigsight.records import Record
@@ -92,14 +92,17 @@ def identifiable(
 
 
 def undriven_inertias(motions: Sequence[RecordMotion], values: Mapping[str, float]) -> set[str]:
-    """Return the names of the parameters of the kinetic energy in equations that no drive enters: they set their scale."""
+    """Return the names of the parameters of the kinetic energy in equations that no drive and no known weight enters.
+
+    They set the scale of these equations.
+    """
     motion = motions[0]
     equations, rig = motion.equations, motion.equations.rig
     if not equations.n_coordinates:
         return set()
     p = equations.parameters(values, motion.record)
     along = equations.slopes_along(motion.z, motion.u, p)
-    driven = np.any([np.any(along[drive.name], axis=1) for drive in rig.mechanism.drives], axis=0)
+    driven = np.any([np.any(along[drive.name], axis=1) for drive in rig.mechanism.drives], axis=0) | weighed(rig)
     moved = {symbol.name for symbol in rig.mechanism.kinetic.free_symbols}
     names = [parameter.name for parameter in rig.parameters if parameter.name in moved]
     slopes = motion.slopes(values, names)
