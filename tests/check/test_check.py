@@ -100,6 +100,14 @@ def test_a_free_motion_that_does_not_decay_is_a_warning() -> None:
     assert "warning" not in severities(check(free(0.05)), "x")
 
 
+@pytest.mark.parametrize("phase", [1.94, 2.33, 2.71])
+def test_a_slow_decay_is_seen_wherever_the_record_is_cut(phase: float) -> None:
+    t = 0.01 * np.arange(500)
+    x = 0.07 * np.exp(-0.02 * t) * np.cos(8.48 * t + phase)
+    record = Record("swings", 0.01, {"u": np.zeros(t.size), "x": x}, {})
+    assert "warning" not in severities(check(replace(campaign(), records=(record,))), "x")
+
+
 def test_an_unstable_rig_is_a_warning_and_its_parameters_are_known_all_the_same() -> None:
     own = campaign()
     unstable = replace(own, parameters={**own.parameters, "k": -30.0, "d": 5.0})

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rigsight.effects import effect_named
 from rigsight.excitation import log_sweep
 from rigsight.records import Record
-from rigsight.rigs import AXIS
+from rigsight.rigs import AXIS, RIGS
 from rigsight.simulate import compose, simulate
-from rigsight.workflow.campaign.record_notes import unit_mismatch
+from rigsight.workflow.campaign.record_notes import record_notes, unit_mismatch
 
 DT = 4e-3
 VALUES = {"gain": 1.0, "m": 1.0, "d": 1.5, "k": 400.0, "x_off": 0.0, "force_off": 0.0, "T_c": 0.6}
@@ -49,3 +52,29 @@ def test_records_that_rest_or_lack_the_signal_are_passed_over() -> None:
     rest = moved.with_signals(u=np.zeros(moved.n_samples))
     without = Record("input", DT, {"u": moved["u"]}, {"u": "N"})
     assert unit_mismatch([moved, rest, without], "u", "x") is None
+
+
+def test_the_gain_of_one_of_several_inputs_that_step_together_is_not_compared() -> None:
+    arm = RIGS["two_link_arm"]
+    sources, seen = [signal.name for signal in arm.inputs], [signal.name for signal in arm.outputs]
+    rng = np.random.default_rng(0)
+    shape = np.repeat(rng.choice([-1.0, 1.0], 100), 20)
+
+    def moved(name: str, *sizes: float) -> Record:
+        drives = {source: size * shape for source, size in zip(sources, sizes, strict=True)}
+        answer = np.cumsum(sum(sizes) * shape) * DT
+        return Record(name, DT, {**drives, **dict.fromkeys(seen, answer)}, {})
+
+    def asked(records: Sequence[Record]) -> bool:
+        return any("another unit" in note for note in record_notes("arm.toml", arm, records))
+
+    assert not asked([moved("one", 1.0, 0.0), moved("both", 1.0, 99.0)])
+    assert asked(
+        [
+            moved("one", 1.0, 0.0),
+            replace(
+                moved("other", 100.0, 0.0),
+                signals=moved("one", 1.0, 0.0).signals | {sources[0]: 100.0 * shape},
+            ),
+        ]
+    )

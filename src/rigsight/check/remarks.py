@@ -25,12 +25,12 @@ _WARNING = "Warning: "
 _NOISY_INPUT = 0.02
 """Noise of an input over its standard deviation from which estimates suffer, most at high frequencies (a convention)."""
 _LASTS = 0.995
-"""RMS of the last third of a free motion over that of the third before from which it does not decay (an assumption): a rig that
-is damped so weakly is called the same."""
+"""Mean amplitude of the later swings of a free motion over that of the earlier ones from which it does not decay (an
+assumption): a rig that is damped so weakly is called the same."""
 _RESTS = 0.05
-"""The same over that of the whole record below which the motion has come to rest (a convention)."""
-_FEWEST_CROSSINGS = 4
-"""Crossings of the mean in a third of a record from which its RMS is one of whole swings: two periods."""
+"""The same over the largest amplitude below which the motion has come to rest (a convention)."""
+_FEWEST_SWINGS = 8
+"""Half periods of the last two thirds of a record from which it is seen to decay or not (a convention)."""
 _UNSTABLE = 1e-6
 """Real part of a pole over its size below which it is rounding."""
 _PAST = 12
@@ -115,25 +115,30 @@ def _lasting(campaign: Campaign) -> Iterator[Remark]:
         if not all(is_constant(record[s.name]) for s in campaign.rig.inputs if s.name in record):
             continue
         for sensor in (s.name for s in campaign.rig.outputs if s.name in record):
-            third = record.n_samples // 3
-            parts = np.split(record[sensor][-2 * third :], 2)
-            before, last = map(np.std, parts)
-            swings = all(_crossings(part) >= _FEWEST_CROSSINGS for part in parts)
-            still_moves = last > max(_LASTS * before, _RESTS * np.std(record[sensor]))
-            if swings and still_moves and moves_beyond_noise(record[sensor]):
+            swings = _amplitudes(record[sensor][record.n_samples // 3 :])
+            if len(swings) < _FEWEST_SWINGS:
+                continue
+            # The same number of swings to both sides.
+            half = len(swings) // 4 * 2
+            before, last = float(np.mean(swings[-2 * half : -half])), float(np.mean(swings[-half:]))
+            still_moves = last > max(_LASTS * before, _RESTS * float(np.ptp(record[sensor])) / 2.0)
+            if still_moves and moves_beyond_noise(record[sensor]):
                 yield Remark(
                     "warning",
-                    f"Record {record.name}: {sensor} does not decay while nothing drives the rig (RMS of the last third "
-                    f"{last:.3g}, of the one before {before:.3g}). Its damping is negative at some amplitude, or something "
-                    "drives it that was not recorded.",
+                    f"Record {record.name}: {sensor} does not decay while nothing drives the rig (mean amplitude of its last "
+                    f"{half} half periods {last:.3g}, of the {half} before {before:.3g}). Its damping is negative at some "
+                    "amplitude, or something drives it that was not recorded.",
                     "Allow a negative damping, or record what drives it.",
                     record.name,
                     sensor,
                 )
 
 
-def _crossings(part: Floats) -> int:
-    return int(np.count_nonzero(np.diff(np.sign(part - np.mean(part)))))
+def _amplitudes(samples: Floats) -> list[float]:
+    """Return the largest deviation from the mean between its crossings, of whole half periods."""
+    deviation = samples - np.mean(samples)
+    crossings = np.flatnonzero(np.diff(deviation >= 0.0)) + 1
+    return [float(np.max(np.abs(part))) for part in np.split(deviation, crossings)[1:-1]]
 
 
 def _unstable(linear: Linearization | None) -> Iterator[Remark]:

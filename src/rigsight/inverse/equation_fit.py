@@ -102,7 +102,9 @@ def undriven_inertias(motions: Sequence[RecordMotion], values: Mapping[str, floa
         return set()
     p = equations.parameters(values, motion.record)
     along = equations.slopes_along(motion.z, motion.u, p)
-    driven = np.any([np.any(along[drive.name], axis=1) for drive in rig.mechanism.drives], axis=0) | weighed(rig)
+    driven = np.any([np.any(along[drive.name], axis=1) for drive in rig.mechanism.drives], axis=0) | weighed(
+        rig
+    )
     moved = {symbol.name for symbol in rig.mechanism.kinetic.free_symbols}
     names = [parameter.name for parameter in rig.parameters if parameter.name in moved]
     slopes = motion.slopes(values, names)

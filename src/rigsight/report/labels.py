@@ -117,6 +117,12 @@ def share_label(own: FamilyAtPlace) -> str:
     return f"{percent(own.share)} ({low} to {high})"
 
 
+def gap_of_shares(diagnosis: Diagnosis) -> str:
+    """Return of what the shares of families are: of a gap of the sensors, or of the force along the motion."""
+    of_motion = diagnosis.shares is not None and diagnosis.shares.of == "motion"
+    return "squared force that the equations leave along the motion" if of_motion else "squared gap"
+
+
 @dataclass(frozen=True)
 class Written:
     """A number as text: ``(value +/- std) * 10^exponent``."""

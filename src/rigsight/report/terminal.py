@@ -97,7 +97,9 @@ def diagnosis_rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
             f"{wording.stages_reported(diagnosis, gap)}, noise floor {gap_percent(gap.noise_floor)}",
         )
     for cause in diagnosis.families[:_RANKED]:
-        of_gap = f", {labels.share_label(cause)} of the squared gap" if cause.share > 0.0 else ""
+        of_gap = (
+            f", {labels.share_label(cause)} of the {labels.gap_of_shares(diagnosis)}" if cause.share else ""
+        )
         yield (
             labels.family_label(cause),
             f"probability {labels.percent(cause.probability)}{of_gap}"

@@ -287,6 +287,8 @@ class Remainder:
     goes_with: str
     # Probability that noise and disturbance alone correlate this well with anything that was tested.
     p_value: float
+    # True if the share is of the part that correlates: where the noise is not known, the rest may be noise.
+    is_part: bool = False
     # True if the verdict names a cause: then the remaining error is in addition to it.
     beside_a_cause: bool = True
 
@@ -304,7 +306,8 @@ class Remainder:
                 f"{self.p_value:.2g}): parameters may be off by more than their standard errors."
             )
         percent = float(f"{100.0 * self.share:.2g}")
-        reported = f"The remaining error, {percent:g} % of the squared gap,"
+        of_error = "A part of the remaining error" if self.is_part else "The remaining error"
+        reported = f"{of_error}, {percent:g} % of the squared gap,"
         remainder = (
             f"{reported} is concentrated in {CONCENTRATED}, unlike noise"
             if self.goes_with == CONCENTRATED
@@ -338,7 +341,7 @@ def remainder_of(
 ) -> Remainder:
     """Return the remaining error of a model."""
     if found.adequate:
-        return Remainder(0.0, (), "", found.p_value, beside_a_cause)
+        return Remainder(0.0, (), "", found.p_value, False, beside_a_cause)
     # What is concentrated in a few stretches remains whole, whatever small part correlates with something by chance.
     share = 1.0 if found.goes_with == CONCENTRATED or not found.agreements else found.agreements[0].share
     above = share * model.error_over_noise**2 if lower_bound else max(model.error_over_noise**2 - 1.0, 0.0)
@@ -348,4 +351,5 @@ def remainder_of(
         else max(reidentified.error_over_noise**2 - 1.0, 1e-300)
     )
     where = (found.place,) if found.place else ()
-    return Remainder(min(1.0, above / whole), where, found.goes_with, found.p_value, beside_a_cause)
+    is_part = lower_bound and share < 1.0
+    return Remainder(min(1.0, above / whole), where, found.goes_with, found.p_value, is_part, beside_a_cause)

@@ -12,6 +12,7 @@ from rigsight.errors import InputError
 from rigsight.records import Record
 from rigsight.records.channel_units import UnknownUnitError, conversion, has_si, is_a
 from rigsight.records.record import Floats
+from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig, rotational
 
 _SEGMENTS = 8
@@ -93,7 +94,10 @@ def _other_units(rig: Rig, records: Sequence[Record]) -> Iterator[str]:
     """Ask about a signal whose gain differs so much between records that it is probably in another unit in one of them."""
     for output in rig.outputs:
         for source in rig.inputs:
-            found = unit_mismatch(records, source.name, output.name)
+            # The gain of one input is seen where the others rest.
+            others = [signal.name for signal in rig.inputs if signal is not source]
+            alone = [r for r in records if all(is_constant(r[name]) for name in others if name in r)]
+            found = unit_mismatch(alone, source.name, output.name)
             if found is not None:
                 larger, smaller, ratio = found
                 yield (
