@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -69,12 +68,5 @@ def test_the_gain_of_one_of_several_inputs_that_step_together_is_not_compared() 
         return any("another unit" in note for note in record_notes("arm.toml", arm, records))
 
     assert not asked([moved("one", 1.0, 0.0), moved("both", 1.0, 99.0)])
-    assert asked(
-        [
-            moved("one", 1.0, 0.0),
-            replace(
-                moved("other", 100.0, 0.0),
-                signals=moved("one", 1.0, 0.0).signals | {sources[0]: 100.0 * shape},
-            ),
-        ]
-    )
+    alone = moved("one", 1.0, 0.0)
+    assert asked([alone, alone.with_signals(**{sources[0]: 100.0 * shape})])
