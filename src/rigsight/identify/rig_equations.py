@@ -87,10 +87,11 @@ class RigEquations:
         return bool(slopes.is_symbolic() is False and slopes.rank() == len(wanted))
 
     @cached_property
-    def of_own_states(self) -> frozenset[str]:
-        """Sensors that read a state other than the motion, whose rate depends on the parameters."""
-        own = {state.symbol for state in self.rig.mechanism.states}
-        return frozenset(s.name for s in self.rig.mechanism.sensors if s.reads.free_symbols & own)
+    def of_coordinates(self) -> frozenset[str]:
+        """Sensors whose slope does not depend on the parameters: neither that of a rate does, nor that of an own state."""
+        mechanism = self.rig.mechanism
+        others = {*(c.rate for c in mechanism.free), *(state.symbol for state in mechanism.states)}
+        return frozenset(s.name for s in mechanism.sensors if not s.reads.free_symbols & others)
 
     def inputs_of(self, record: Record) -> tuple[HeldInput, Floats]:
         """Return a record's inputs between samples, and at them with their derivatives, shape (3 n_inputs, n_samples)."""

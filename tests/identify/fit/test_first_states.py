@@ -68,6 +68,18 @@ def test_it_is_found_once_and_right(run: Record) -> None:
     np.testing.assert_array_equal(rig_state(equations, run, {**VALUES, "R": 5.0}), found)
 
 
+@pytest.mark.parametrize("asked_first", [0.02, 2.0])
+def test_beside_a_sensor_of_the_rate_it_does_not_depend_on_the_numbers_that_came_first(
+    run: Record, asked_first: float
+) -> None:
+    """The slope of a rate is an acceleration, which follows from the numbers."""
+    gyro = MOTOR + '[sensors.rate]\nreads = "d(phi)"\nunit = "rad/s"\n'
+    equations = equations_of(rig_of_text(gyro, "motor.toml"))
+    record = run.with_signals(rate=np.gradient(run["angle"], run.dt))
+    rig_state(equations, record, {**VALUES, "d": asked_first, "J": 1e-5})
+    np.testing.assert_allclose(rig_state(equations, record, VALUES), [0.3, 4.0, 0.7], rtol=0.05)
+
+
 @pytest.mark.parametrize("begin", [40, 200])
 def test_in_the_middle_of_a_bent_path_its_speed_is_right(run: Record, begin: int) -> None:
     """A straight line through seven samples would err by the acceleration times three samples."""

@@ -84,7 +84,7 @@ def rig_state(
     known = _known.setdefault(record, {})
     key = (equations, resting, numbers)
     if key not in known:
-        moving = [n for n in equations.sensor_names if not shown or n not in equations.of_own_states]
+        moving = [n for n in equations.sensor_names if not shown or n in equations.of_coordinates]
         known[key] = _rig_state(equations, record, values, resting, moving, 0.0 if shown else _PULL)
     return known[key].copy()
 
