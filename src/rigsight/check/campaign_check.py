@@ -205,7 +205,9 @@ def _parameters(
         limit = min(window_length(rig, records), limit or np.inf)
     windows = cut(records, limit)
     scales = characteristic_scales(rig, windows, values)
-    held = {campaign.absent_spring} if campaign.absent_spring else set()
+    held, factor = {campaign.absent_spring} if campaign.absent_spring else set(), campaign.open_factor
+    if factor is not None and factor.is_given:
+        held.add(factor.held)
     free = [p.name for p in structure.parameters if p.name not in {*campaign.constants, *held}]
     fit = GreyBoxFit(structure, windows, scales, noise)
     result = fit.fit({**values}, free, max_evaluations=_EVALUATIONS, tolerance=1e-3)
@@ -219,7 +221,7 @@ def _parameters(
     return tuple(
         CheckedParameter(name, units[name], _status(name, found), error)
         for name, error in found.relative_errors.items()
-    ), found.sentence
+    ), " ".join([found.sentence, *([factor.sentence] if factor is not None and factor.is_given else [])])
 
 
 def _status(name: str, found: Identifiability) -> Status:

@@ -276,8 +276,8 @@ def _with_errors(
             covariance=covariance,
         )
 
-    # Fits of single records hold the same value, so that they can be compared with each other.
-    whole = fit.fit if factor is None else _with_unknown(fit.fit, factor.held)
+    # Fits of single records hold the same value, so that they can be compared with each other. A value that was given is known.
+    whole = fit.fit if factor is None or factor.is_given else _with_unknown(fit.fit, factor.held)
     known, together = corrected(whole, windows)
     kinds = tuple(
         replace(kind, fit=corrected(kind.fit, [w for w in windows if w.origin == kind.kind])[1])
