@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError, check_in_range, nearest
 
+_ENDLESS = 1e100
+"""Null values from here on stand for infinity."""
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -43,6 +46,17 @@ class Parameter:
         if self.default is None:
             raise ValueError(f"Parameter {self.name} is not fitted and has neither a start nor a default.")
         return self.default
+
+    @property
+    def is_limit(self) -> bool:
+        """True if the effect that owns the parameter vanishes where it is infinite."""
+        return self.null is not None and self.null >= _ENDLESS
+
+    def grown(self, value: float, factor: float) -> float:
+        """Return the value with which the parameter scales its effect by a factor; the same if another one does that."""
+        if self.null is None:
+            return value
+        return value / factor if self.is_limit else self.null + factor * (value - self.null)
 
     def check(self, value: float) -> float:
         """Return `value` as a float."""

@@ -37,7 +37,6 @@ TOLERANCES = {
     "_AT_BOUND": "equality of floats",
     "_EQUAL": "equality of floats",
     "_SMALLEST": "division by zero",
-    "ENDLESS": "infinity",
     "_DAMPING_RATIO": "shape of a weight",
     "_TOLERANCE": "of an optimizer",
     "_ROUGH_TOLERANCE": "of an optimizer",

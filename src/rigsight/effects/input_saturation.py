@@ -28,7 +28,7 @@ INPUT_SATURATION = Effect(
     summary="The drive cannot exceed a limit.",
     parameters=(
         # Far beyond the inputs of a fit without it, which takes what the limit cuts off for a small gain of the drive.
-        limit("u_max", "largest drive input", "input", lower=0.0, starts=(0.8, 0.4), search=(0.02, 50.0)),
+        limit("u_max", "largest drive input", "input", lower=0.0, starts=(0.8, 0.4), search=(0.02, 2.0)),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),

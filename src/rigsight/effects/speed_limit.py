@@ -39,8 +39,7 @@ SPEED_LIMIT = Effect(
             "input",
             lower=0.0,
             starts=(0.8, 0.5),
-            # Far beyond the inputs of a fit without it, which takes what the limit cuts off for a small gain of the drive.
-            search=(0.02, 50.0),
+            search=(0.02, 3.0),
         ),
         Parameter(
             "c_u",

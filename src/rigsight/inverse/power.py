@@ -26,7 +26,6 @@ _SIZES = np.geomspace(1e-4, 10.0, 11)
 """Sizes that are tried first, relative to the start value of the effect's search."""
 _STEPS = 4
 """Sizes between two of them."""
-_ENDLESS = 1e100
 
 
 @dataclass(frozen=True)
@@ -155,10 +154,5 @@ def _own_values(terms_of: EffectTerms, effect: Effect, size: float) -> dict[str,
     for p in effect.parameters:
         usual = characteristic_value(placed_dimension(effect, p.dimension), terms_of.scales)
         start = p.starts[0] * usual if p.fitted else p.held_at(usual)
-        if not p.fitted or p.null is None:
-            values[p.name] = start
-        elif abs(p.null) < _ENDLESS:
-            values[p.name] = p.null + size * (start - p.null)
-        else:
-            values[p.name] = start / size
+        values[p.name] = p.grown(start, size) if p.fitted else start
     return values

@@ -59,6 +59,8 @@ def test_an_effect_none_of_whose_numbers_the_records_determine_is_undetermined(m
     assert not any(map(is_undetermined, (reidentified, coulomb, stribeck)))
     errors = {**coulomb.fit.standard_errors, "T_c": np.inf}
     assert is_undetermined(replace(coulomb, fit=replace(coulomb.fit, standard_errors=errors)))
+    open_factor = dict.fromkeys(coulomb.fit.free, np.inf)
+    assert not is_undetermined(replace(coulomb, fit=replace(coulomb.fit, standard_errors=open_factor)))
 
 
 def test_plain_numbers_leave_no_doubt(models) -> None:

@@ -22,7 +22,7 @@ import numpy as np
 from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.first_look import LOOK_ACCURACY
-from rigsight.diagnose.search.starts import sized, start_values
+from rigsight.diagnose.search.starts import start_values
 from rigsight.effects import Effect
 from rigsight.identify import FitResult, GreyBoxFit
 from rigsight.records.record import Floats
@@ -49,7 +49,8 @@ def in_lowest_basins(context: FitContext, models: Sequence[FittedModel]) -> list
     def lowest(own: FittedModel) -> FittedModel:
         starts = [] if is_explained else _starts(own)
         others = nearest[1:2] if own is leader else [leader]
-        return in_lowest_basin(context, own, [*starts, *(values_in(other, own) for other in others)])
+        starts += [values_in(other, own) for other in others]
+        return in_lowest_basin(context, own, [(start, None) for start in starts])
 
     found = dict(zip(map(id, nearest), context.threads.side_by_side(lowest, nearest), strict=True))
     return [found.get(id(model), model) for model in models]
@@ -71,16 +72,18 @@ def values_in(leader: FittedModel, model: FittedModel) -> dict[str, float]:
 
 
 def in_lowest_basin(
-    context: FitContext, model: FittedModel, starts: Sequence[dict[str, float]]
+    context: FitContext,
+    model: FittedModel,
+    starts: Iterable[tuple[Mapping[str, float], Sequence[Floats] | None]],
 ) -> FittedModel:
-    """Return a model in the lowest minimum that is reached from where it is and from other starts."""
+    """Return a model in the lowest minimum that is reached from where it is and from other values and initial states."""
     fit = model.fit
     rough = context.problem(fit.structure, context.estimation, LOOK_ACCURACY)
 
-    def roughly(values: dict[str, float]) -> FitResult:
-        return rough.fit(values, fit.free, None, SEARCH.basin_evaluations, _TOLERANCE, finish=False)
+    def roughly(values: Mapping[str, float], states: Sequence[Floats] | None) -> FitResult:
+        return rough.fit(values, fit.free, states, SEARCH.basin_evaluations, _TOLERANCE, finish=False)
 
-    here, *elsewhere = map(roughly, [fit.values, *starts])
+    here, *elsewhere = itertools.starmap(roughly, [(fit.values, None), *starts])
     lowest = min([here, *elsewhere], key=lambda found: found.cost)
     # Roughly simulated, so that what looks lower may not be, and conversely: the finished fit decides.
     if not (is_lower(lowest, fit) or is_lower(lowest, here)):
@@ -143,7 +146,11 @@ def lowered_by_extensions(
     better = [larger for larger in extensions if is_lower(larger.fit, model.fit)]
     if not better:
         return model
-    return in_lowest_basin(context, model, [values_in(larger, model) for larger in better])
+    # States that no sensor shows are those of the better model, too: from others its numbers may lead elsewhere.
+    structure = model.fit.structure
+    return in_lowest_basin(
+        context, model, [(values_in(larger, model), _states(structure, larger.fit)) for larger in better]
+    )
 
 
 def at_least_as_good(context: FitContext, model: FittedModel, without: FittedModel) -> FittedModel:
@@ -154,9 +161,9 @@ def at_least_as_good(context: FitContext, model: FittedModel, without: FittedMod
         return model
     structure, (effect,) = model.fit.structure, model.effects
     sizes = {
-        structure.parameter_name(effect, p.name): p.null
+        name: p
         for p in effect.parameters
-        if p.null is not None and structure.parameter_name(effect, p.name) in model.fit.free
+        if p.null is not None and (name := structure.parameter_name(effect, p.name)) in model.fit.free
     }
     own = next(start_values(context, structure, effect, without.fit, {}), {})
     start = {
@@ -165,12 +172,13 @@ def at_least_as_good(context: FitContext, model: FittedModel, without: FittedMod
         **without.fit.values,
         **context.constant_forces_beside(structure.effects),
     }
-    faint = {name: sized(start[name], null, _FAINT) for name, null in sizes.items()}
+    faint = {name: p.grown(start[name], _FAINT) for name, p in sizes.items()}
     problem = context.problem(structure, context.estimation)
     found = _lowest_from(problem, [{**start, **faint}], model.fit.free, _states(structure, without.fit))
     if found.residuals and not _is_worse(found, without.fit):
         return context.score(model.effects, found, tolerance=_TOLERANCE)
-    return _at_null(model, without, {**start, **sizes})
+    nulls = {name: p.null for name, p in sizes.items() if p.null is not None}
+    return _at_null(model, without, {**start, **nulls})
 
 
 def _from_simpler_effect(context: FitContext, model: FittedModel, simpler: FittedModel) -> FittedModel:
@@ -239,16 +247,16 @@ def _at_null(model: FittedModel, without: FittedModel, values: Mapping[str, floa
     return replace(without, effects=model.effects, fit=at_null, held_out=held_out)
 
 
-def _states(structure: Structure, simpler: FitResult) -> tuple[Floats, ...]:
-    """Return initial states and offsets of a simpler model for a structure that may have more states; those are zero."""
-    names = [str(equation.symbol) for equation in simpler.structure.equations]
+def _states(structure: Structure, fit: FitResult) -> tuple[Floats, ...]:
+    """Return initial states and offsets of a fit for a structure that may have other states; those are zero."""
+    names = [str(equation.symbol) for equation in fit.structure.equations]
 
     def of_record(own: Floats) -> Floats:
         known = dict(zip(names, own[: len(names)].tolist(), strict=True))
         states = [known.get(str(equation.symbol), 0.0) for equation in structure.equations]
         return np.concatenate([states, own[len(names) :]])
 
-    return tuple(map(of_record, simpler.initial_states))
+    return tuple(map(of_record, fit.initial_states))
 
 
 def without_repeated_equations(context: FitContext, models: Sequence[FittedModel]) -> list[FittedModel]:

@@ -34,7 +34,7 @@ from rigsight.diagnose.pushes.probes import (
     with_probes,
 )
 from rigsight.diagnose.pushes.responses import Responses
-from rigsight.diagnose.search.starts import sized, start_values
+from rigsight.diagnose.search.starts import start_values
 from rigsight.effects import Effect, Place, kind_of, placed_dimension
 from rigsight.effects import symbols as canonical
 from rigsight.identify import FitResult
@@ -147,10 +147,7 @@ class Shortlist:
         """Return the response to an effect that no push represents, from each of its starts, shape (n, n_starts)."""
         columns = []
         for own in self._starts(effect):
-            small = {
-                p.name: own[p.name] if p.null is None else sized(own[p.name], p.null, _SMALL)
-                for p in effect.parameters
-            }
+            small = {p.name: p.grown(own[p.name], _SMALL) for p in effect.parameters}
             columns.append(self._responses.to_effect(effect, small) / _SMALL)
         return self._responses.without_free(np.column_stack(columns))
 
@@ -306,9 +303,7 @@ def scaled(effect: Effect, own: Mapping[str, float], factor: float) -> dict[str,
         return {}
     values = _fitted_values(effect, own)
     fitted = [p for p in effect.parameters if p.name in values]
-    grown = {
-        p.name: values[p.name] if p.null is None else sized(values[p.name], p.null, factor) for p in fitted
-    }
+    grown = {p.name: p.grown(values[p.name], factor) for p in fitted}
     return grown if all(p.lower <= grown[p.name] <= p.upper for p in fitted) else {}
 
 

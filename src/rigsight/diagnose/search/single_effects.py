@@ -25,6 +25,7 @@ from rigsight.diagnose.search.first_look import (
 from rigsight.diagnose.search.nested_models import (
     at_least_as_good,
     in_lowest_basins,
+    is_lower,
     ordered_by_inclusion,
     without_repeated_equations,
 )
@@ -40,14 +41,16 @@ _HOPELESS_TOLERANCE = 1e-2
 
 def reidentify(context: FitContext, start: Mapping[str, float]) -> FittedModel:
     """Re-identify the equations without an effect."""
-    # Starts from the parameters of a regression, or from those of the given simulation if the rig cannot be simulated with the
-    # former: the regression does not determine all parameters if no sensor reads a coordinate. Where parameters start at a bound,
-    # such as a friction given as zero, also from inside of it.
+    # Starts from the parameters of a regression, and from those of the given simulation: the regression does not determine all
+    # parameters if no sensor reads a coordinate. Where parameters start at a bound, such as a friction given as zero, also from
+    # inside of it.
     structure = context.composed()
     problem, free = context.problem(structure, context.estimation), context.free_parameters(structure)
     fit = problem.fit(start, free)
-    if not fit.residuals and context.given:
-        fit = problem.fit({**start, **context.given}, free)
+    if context.given:
+        from_given = problem.fit({**start, **context.given}, free)
+        if not fit.residuals or is_lower(from_given, fit):
+            fit = from_given
     inside = off_bounds(structure, start, free, context.scales)
     if inside is not None:
         fit = min(fit, problem.fit(inside, free), key=lambda found: found.cost)

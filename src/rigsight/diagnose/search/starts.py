@@ -205,10 +205,6 @@ def _response_at(context: FitContext, effect: Effect, base: FitResult) -> Answer
     return response
 
 
-ENDLESS = 1e100
-"""Null values from here on stand for infinity."""
-
-
 def start_values(
     context: FitContext,
     structure: Structure,
@@ -233,7 +229,7 @@ def _with_larger_gain(
     context: FitContext, structure: Structure, effect: Effect, start: Mapping[str, float]
 ) -> Iterator[dict[str, float]]:
     """Yield a start of a limit of a drive at a larger gain, with the same limit of its force."""
-    limits = [p.name for p in effect.parameters if p.null is not None and p.null >= ENDLESS]
+    limits = [p.name for p in effect.parameters if p.is_limit]
     if effect.place is not Place.ACTUATOR or not limits:
         return
     free = context.free_parameters(structure)
@@ -262,8 +258,3 @@ def restart_values(structure: Structure, effect: Effect, fit: FitResult) -> Iter
     """Yield further start values for a fit with `effect` that may have stopped in a local minimum."""
     for moved in moved_starts(structure, effect, fit.values):
         yield {**carried_over(fit.values, fit.structure, structure), **moved}
-
-
-def sized(value: float, null: float, factor: float) -> float:
-    """Return the value of a parameter that scales its effect by a factor relative to another value."""
-    return null + factor * (value - null) if abs(null) < ENDLESS else value / factor

@@ -12,7 +12,6 @@ from scipy.stats import chi2, norm
 from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.policy import NOTES, VERDICT
 from rigsight.diagnose.search.nested_models import is_lower
-from rigsight.diagnose.search.starts import ENDLESS
 from rigsight.diagnose.verdict.ranking import Ranking
 from rigsight.effects import Effect, placed_dimension
 from rigsight.parameters import Parameter
@@ -67,11 +66,14 @@ def doubts(model: FittedModel, reidentified: FittedModel) -> tuple[Doubt, ...]:
 
 
 def is_undetermined(model: FittedModel) -> bool:
-    """Return True if the records determine no parameter of an effect of a model that has parameters."""
+    """Return True if the records determine no parameter of an effect of a model, though they determine those of the rig."""
+    # Where those of the rig are not determined either, a common factor may be open: an effect is then determined relative to it.
     fit = model.fit
     own = [[fit.structure.parameter_name(e, p.name) for p in e.parameters] for e in model.effects]
+    of_rig = [fit.standard_errors[name] for name in fit.free if not any(name in names for names in own)]
     of_effects = [[fit.standard_errors[name] for name in names if name in fit.free] for names in own]
-    return any(errors and not np.any(np.isfinite(errors)) for errors in of_effects)
+    unknown = any(errors and not np.any(np.isfinite(errors)) for errors in of_effects)
+    return unknown and bool(np.all(np.isfinite(of_rig)))
 
 
 def has_size_of_zero(model: FittedModel, others: Sequence[FittedModel]) -> bool:
@@ -129,7 +131,7 @@ def _is_within_errors(model: FittedModel, effect: Effect) -> bool:
     """Return True if the size of an effect is determined and does not differ from zero, an infinite one in the reciprocal."""
     fit = model.fit
     sizes = {
-        name: fit.values[name] - (p.null if abs(p.null) < ENDLESS else 0.0)
+        name: fit.values[name] - (0.0 if p.is_limit else p.null)
         for p in effect.parameters
         if p.null is not None and (name := fit.structure.parameter_name(effect, p.name)) in fit.free
     }

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.effects import Place
 from rigsight.parameters import Parameter
 from rigsight.records.record import Floats
 from rigsight.simulate import Structure, parameter_vector
@@ -23,6 +24,9 @@ STEP = 1e-4
 FINE_STEP = 1e-6
 """Difference step of a coordinate without events: sets side by side take the same steps, so that only rounding limits it."""
 _MARGIN = 1e-9
+_BEYOND = 25.0
+"""Factor on the largest limit of a drive whose signal has a free gain: a fit without the limit takes what it cuts off for a small
+gain, which grows beside it. Beyond the signal itself a limit of a known gain would not act."""
 _LEAST_STIFFNESS = 1e-12
 _MOST_STIFFNESS = 1e12
 """Range of a stiffness with memory, in characteristic units: its logarithm is searched."""
@@ -82,6 +86,8 @@ class Coordinates:
         returning = [name in structure.rig.usually_positive and values[name] > 0.0 for name in free]
         bounds = [_bounds(*own) for own in zip(chosen, scale, returning, strict=True)]
         lower, upper = np.array(bounds, dtype=np.float64).reshape(-1, 2).T.copy()
+        beside_gain = [free.index(name) for name in _limits_beside_gain(structure, free)]
+        upper[beside_gain] *= _BEYOND
         pairs = []
         searched = [(effect, pair) for effect in structure.effects for pair in effect.searched_as]
         for effect, pair in searched:
@@ -207,6 +213,19 @@ class Coordinates:
     def jacobian(self, theta: Floats) -> Floats:
         """Return d parameters / d coordinates of the free parameters, shape (n_free, n_free)."""
         return self.derivatives(theta)[self.index]
+
+
+def _limits_beside_gain(structure: Structure, free: Sequence[str]) -> list[str]:
+    """Return the free limits of drives whose signal has a free parameter."""
+    signals = {drive.name: drive.signal.free_symbols for drive in structure.rig.mechanism.drives}
+    return [
+        name
+        for effect in structure.effects
+        if effect.place is Place.ACTUATOR
+        for p in effect.parameters
+        if p.is_limit and (name := structure.parameter_name(effect, p.name)) in free
+        if any(symbol.name in free for symbol in signals.get(structure.rig.acts_at(effect), ()))
+    ]
 
 
 def _split(structure: Structure, free: Sequence[str]) -> _Split | None:
