@@ -113,8 +113,8 @@ def test_the_best_one_starts_from_the_numbers_of_the_next_too(
     next_one = fitted(bench, effect_named("coulomb_friction"), {**TRUE, "T_c": 2e-3})
     asked: dict[tuple[str, ...], list[Mapping[str, float]]] = {}
 
-    def noted(_: FitContext, own: FittedModel, starts: list[Mapping[str, float]]) -> FittedModel:
-        asked[own.names] = starts
+    def noted(_: FitContext, own: FittedModel, starts: list[tuple[Mapping[str, float], None]]) -> FittedModel:
+        asked[own.names] = [values for values, _ in starts]
         return own
 
     monkeypatch.setattr(nested_models, "in_lowest_basin", noted)
