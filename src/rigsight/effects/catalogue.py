@@ -30,6 +30,7 @@ from rigsight.effects.flexible_mode import FLEXIBLE_MODE
 from rigsight.effects.free_play import FREE_PLAY
 from rigsight.effects.friction_compensation import FRICTION_COMPENSATION
 from rigsight.effects.gravity_pendulum import GRAVITY_PENDULUM
+from rigsight.effects.gravity_torque import GRAVITY_TORQUE
 from rigsight.effects.inertia import INERTIA
 from rigsight.effects.input_dead_zone import INPUT_DEAD_ZONE
 from rigsight.effects.input_delay import INPUT_DELAY
@@ -76,6 +77,7 @@ CATALOGUE: tuple[Effect, ...] = (
     CUBIC_STIFFNESS,
     POWER_LAW_STIFFNESS,
     GRAVITY_PENDULUM,
+    GRAVITY_TORQUE,
     TORQUE_RIPPLE,
     END_STOP,
     FREE_PLAY,

@@ -241,6 +241,8 @@ class Effect:
         True if it makes no sense where the motion is prescribed.
     needs_known_inertia
         True if it is the same as another effect where all of the inertia is a parameter.
+    turns_freely
+        True for a law of an angle that no spring brings back; beside a spring another effect does the same.
     at
         Name of the joint, drive, sensor or state of a rig at which it acts; None for the first of its kind.
     """
@@ -273,6 +275,7 @@ class Effect:
     special_cases: dict[str, float] = field(default_factory=dict)
     needs_inertia: bool = False
     needs_known_inertia: bool = False
+    turns_freely: bool = False
     at: str | None = None
 
     @property

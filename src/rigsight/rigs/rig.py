@@ -352,6 +352,10 @@ class Rig:
         joint = joint_of(self, effect)
         if effect.reads(symbols.acceleration) and mechanism.moves_inertia(joint.motion):
             return False  # Only that of a prescribed motion is known.
+        if effect.turns_freely:
+            units = {c.unit for c in mechanism.coordinates if c.symbol in joint.motion.free_symbols}
+            if units != {"rad"} or joint.stiffness != 0:
+                return False
         if effect.needs_known_inertia and not mechanism.has_known_inertia(joint.motion, self.parameters):
             return False
         # What needs the inertia of a joint takes forces of the drive from it, with a load or without.

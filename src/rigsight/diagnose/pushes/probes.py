@@ -87,7 +87,7 @@ def _composed(effect: Effect) -> tuple[Structure, int]:
         return compose(_signal_alone(effect.reads(canonical.v)), (replace(effect, at=_DRIVE),)), 0
     if effect.place is Place.SENSOR:
         return compose(_signal_alone(False), (replace(effect, at=_SHOWN),)), 1
-    return compose(_joint_alone(sees_load(effect)), (replace(effect, at=_JOINT),)), 0
+    return compose(_joint_alone(sees_load(effect)), (replace(effect, at=_JOINT, turns_freely=False),)), 0
 
 
 def sees_load(effect: Effect) -> bool:

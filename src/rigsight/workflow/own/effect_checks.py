@@ -94,6 +94,20 @@ _SERVO: dict[str, Any] = {
     },
     "sensors": {"x": {"reads": "q", "unit": "m"}},
 }
+_TURNING: dict[str, Any] = {
+    **_SERVO,
+    "name": "turning_drive",
+    "inputs": {"goal": {"unit": "rad"}},
+    "constants": {"m_l": {"unit": "kg m^2", "default": 0.6}},
+    "parameters": {
+        "m": {"unit": "kg m^2", "lower": 1e-6},
+        "d": {"unit": "N m s/rad", "lower": 0.0},
+        "k_p": {"unit": "N m/rad", "lower": 0.0},
+        "k_v": {"unit": "N m s/rad", "lower": 0.0},
+    },
+    "coordinates": {"q": {"unit": "rad"}},
+    "sensors": {"x": {"reads": "q", "unit": "rad"}},
+}
 _LAW = {"motor": {"signal": "k_p*(goal - x) - k_v*speed", "force": "motor", "along": "q"}}
 _SENSORS = {**_SERVO["sensors"], "speed": {"reads": "d(q)", "unit": "m/s"}}
 _SERVO_VALUES = {"m_l": 0.6, "m": 0.4, "d": 1.0, "k_p": RESONANCE**2, "k_v": 3.0}
@@ -102,12 +116,15 @@ ELEMENT_BENCH = Bench(ELEMENT, _ELEMENT_VALUES, "force", _ELEMENT_VALUES, ("d", 
 
 
 @cache
-def _with_controller() -> tuple[Bench, Bench]:
-    """Return the position drive, and the mass whose control law is the signal of its drive."""
+def _with_controller() -> tuple[Bench, ...]:
+    """Return the position drive, the mass whose control law is the signal of its drive, and the drive of an angle."""
     of_law = {**_SERVO, "name": "control_law", "drives": _LAW, "sensors": _SENSORS}
-    rigs = rig_of_tables(_SERVO, "Position drive"), rig_of_tables(of_law, "Control law")
-    drive, law = (Bench(rig, _SERVO_VALUES, "x", _SERVO_VALUES, ("m", "d")) for rig in rigs)
-    return drive, law
+    rigs = (
+        rig_of_tables(_SERVO, "Position drive"),
+        rig_of_tables(of_law, "Control law"),
+        rig_of_tables(_TURNING, "Turning drive"),
+    )
+    return tuple(Bench(rig, _SERVO_VALUES, "x", _SERVO_VALUES, ("m", "d")) for rig in rigs)
 
 
 def bench_of(effect: Effect) -> Bench:
@@ -230,21 +247,23 @@ def gives_no_energy(effect: Effect) -> str | None:
 def energy_of_cycles(effect: Effect) -> list[tuple[dict[str, float], float]]:
     """Return what an effect takes of the work of each steady cycle below resonance; motions that do not settle are left out."""
     bench = bench_of(effect)
-    pushed, moved = ("u", "x") if bench is AXIS_BENCH else ("force", "x")
+    # A position drive pushes by its stiffness times the goal: its spring does no net work, its damping does as the joint's.
+    pushed = "force" if bench is ELEMENT_BENCH else bench.rig.inputs[0].name
+    stiffness, damping = bench.values.get("k_p", 1.0), bench.values["d"] + bench.values.get("k_v", 0.0)
     found = []
     for omega in (0.4 * RESONANCE, 0.9 * RESONANCE):
         record = sine_record(SMALL, 40, omega, bench)
         for values in start_values(effect):
             run = simulate(compose(bench.rig, [effect]), values, record)
-            x = run[moved]
+            x = run["x"]
             cycle, before = last_period(x), x[-2 * PER_PERIOD - 1 : -PER_PERIOD - 1]
             still = np.ptp(cycle) == 0.0
             if still or np.max(np.abs(cycle - before)) > _STEADY * np.ptp(cycle):
                 continue
             step = np.diff(np.append(cycle, cycle[0]))
-            force = last_period(run[pushed])
+            force = stiffness * last_period(run[pushed])
             work = float(np.sum(0.5 * (force + np.roll(force, -1)) * step))
-            damper = values["d"] * float(np.sum(step**2)) / record.dt
+            damper = damping * float(np.sum(step**2)) / record.dt
             found.append((values, (work - damper) / (abs(work) + damper)))
     return found
 
