@@ -15,6 +15,8 @@ from rigsight.records.channel_names import closeness, split_unit
         ("Signal/Weg mm", "Signal/Weg", "mm"),
         ("pos_mm", "pos", "mm"),
         ("time_in_ms", "time", "ms"),
+        ("speed_rad_s", "speed", "rad/s"),
+        ("rate deg_per_s", "rate", "deg/s"),
         ("Winkel °", "Winkel", "°"),
         ("x", "x", None),
         ("x_a", "x_a", None),

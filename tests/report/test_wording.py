@@ -133,6 +133,10 @@ def test_no_more_than_the_noise_is_no_second_cause(variant: Callable[[str], Diag
     """What goes with something below the floor is told of the numbers, and not as something smaller that is missing too."""
     left = Remainder(0.0, (), "record: d_r", 0.003)
     assert "within the noise floor, but it still correlates with the record" in left.text
+    unknown_noise = Remainder(0.0, (), "record: d_r", 0.003, is_part=True)
+    assert unknown_noise.text.startswith(
+        "A very small part of the remaining error still correlates with the record"
+    )
     found = replace(variant("effect"), adequate=False, remainder=left)
     assert verdict_name(found) == "Missing effect"
     assert verdict_name(replace(found, remainder=replace(left, share=0.02))) == "Main cause"

@@ -63,15 +63,21 @@ _UNITS_BEHIND = frozenset({
 _IN_BRACKETS = re.compile(
     r"^(?P<bare>.*?)\s*[\[(<]\s*(?P<unit>[^\[\]()<>]*?[^\W\d_][^\[\]()<>]*?|[%°])\s*[\])>]\s*$"
 )
+_RATE_BEHIND = re.compile(
+    r"^(?P<bare>.+?)(?:\s+(?:in\s+)?|_in_|_)(?P<way>m|mm|cm|rad|mrad|deg)(?:_per_|_|/)s$"
+)
 _BEHIND = re.compile(r"^(?P<bare>.+?)(?:\s+(?:in\s+)?|_in_|_|,\s*)(?P<unit>[A-Za-zµμ°]+)$")
 
 
 def split_unit(name: str) -> tuple[str, str | None]:
-    """Return a channel's name without its unit, and the unit: ``"Kraft [kN]"``, ``"Weg mm"``, ``"pos_mm"``."""
+    """Return a channel's name without its unit, and the unit: ``"Kraft [kN]"``, ``"Weg mm"``, ``"speed_rad_s"``."""
     match = _IN_BRACKETS.match(name)
     # A number in brackets is a place: data(:,1), control[0].
     if match and re.search(r"[^\W\d_]|[°%]", match["unit"]):
         return match["bare"], match["unit"]
+    match = _RATE_BEHIND.match(name)
+    if match:
+        return match["bare"], f"{match['way']}/s"
     match = _BEHIND.match(name)
     if match and match["unit"] in _UNITS_BEHIND:
         return match["bare"], match["unit"]

@@ -301,9 +301,11 @@ class Remainder:
                 f"{self.p_value:.2g}): it counts as noise and disturbance."
             )
         if self.share == 0.0:
+            within_noise = "The remaining error is within the noise floor, but it"
+            error = "A very small part of the remaining error" if self.is_part else within_noise
             return (
-                f"The remaining error is within the noise floor, but it still correlates with {_in_words(self.goes_with)} (p = "
-                f"{self.p_value:.2g}): parameters may be off by more than their standard errors."
+                f"{error} still correlates with {_in_words(self.goes_with)} (p = {self.p_value:.2g}): parameters may be off by "
+                "more than their standard errors."
             )
         percent = float(f"{100.0 * self.share:.2g}")
         of_error = "A part of the remaining error" if self.is_part else "The remaining error"

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fit_context import FitContext, FittedModel, fit_context_of
+from rigsight.diagnose.fit_context import FitContext, FittedModel, candidates_on, fit_context_of
 from rigsight.diagnose.noise.adequacy import Checks
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.evidence_for_more import OtherForms
@@ -30,7 +30,7 @@ from rigsight.diagnose.search.worth_fitting import (
     search_places,
     worth_fitting,
 )
-from rigsight.effects import Effect
+from rigsight.effects import CATALOGUE, Effect, kind_of
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import characteristic_scales
 from rigsight.identify.fit.windows import Windowing, leading_output
@@ -67,9 +67,13 @@ def single_models(
     say("re-identified")
     proposal = propose(campaign, {**campaign.constants, **reidentified.fit.values}, effects, context.noise)
     say("missing force")
+    offered = {kind_of(effect.name) for effect in candidates_on(campaign.rig, CATALOGUE, campaign.modelled)}
+    are_chosen = not offered <= {kind_of(effect.name) for effect in effects}
     if proposal is not None:
         effects = [effect for effect in effects if effect.name not in proposal.hidden]
     worth = worth_fitting(campaign.rig, proposal, effects)
+    if are_chosen:
+        worth = replace(worth, alone=tuple(effects), are_chosen=True)
     context = _with_known_motion(campaign, context, reidentified)
     if (
         worth.is_shown
@@ -146,7 +150,7 @@ def _singles(
     best = min((model.error_over_noise for model in singles), default=np.inf)
     # What the motion rules out need not be fitted for a remainder that no law reaches, nor where the motion names the cause.
     enough = VERDICT.at_floor
-    if worth.is_shown:
+    if worth.is_shown and not worth.are_chosen:
         enough = np.inf if worth.explained >= VERDICT.larger_part else larger_part_closed(reidentified)
     if others and best > enough:
         # A right model must not be lost because places or effects were ranked wrongly.

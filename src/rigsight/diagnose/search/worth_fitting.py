@@ -118,6 +118,8 @@ class WorthFitting:
     explained: float = 0.0  # share of the missing force that one family explains, or all that were taken
     # Of effects by their names: where they explain most of the missing force along the motion.
     starts: Mapping[str, ProposedStart] = field(default_factory=dict)
+    # Whether the user named the candidates: all of them are fitted, whatever the motion says of them.
+    are_chosen: bool = False
 
 
 def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]) -> WorthFitting:

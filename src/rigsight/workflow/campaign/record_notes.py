@@ -54,8 +54,8 @@ def _sensors_missing(rig: Rig, records: Sequence[Record]) -> Iterator[str]:
         if 0 < len(without) < len(records):
             listed = ", ".join(f"'{name}'" for name in without)
             yield (
-                f"{sensor.name} is missing in {listed}: nothing is compared with it there. If its column has another name, write "
-                f'columns = {{ {sensor.name} = "..." }} for that record.'
+                f"{sensor.name} is missing in {listed}, or never changes there: nothing is compared with it. If its column has "
+                f'another name, write columns = {{ {sensor.name} = "..." }} for that record.'
             )
 
 
