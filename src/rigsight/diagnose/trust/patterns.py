@@ -111,7 +111,8 @@ _MEANINGS: Mapping[tuple[Pattern, Role | None, int | None], Meaning] = {
     ),
     (Pattern.TIME, Role.OFFSET, None): Meaning("a zero drifts from record to record", _REPEAT),
     (Pattern.TIME, None, None): Meaning(
-        "something unrecorded changes slowly, such as temperature or wear", _REPEAT
+        "something unrecorded changes slowly, such as temperature or wear, if the records were made in this order",
+        _REPEAT,
     ),
     (Pattern.RECORD, Role.OFFSET, None): Meaning(
         "the zero of a sensor or a constant load differs from record to record",
