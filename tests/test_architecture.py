@@ -24,7 +24,7 @@ NAME_A_RIG = {
     "identify/transfer/conicity.py": "API: equation (2.12) of the thesis, of the running gear",
     "rigs/built_in.py": "the built-in rigs",
     "workflow/demo.py": "the demo is the running gear of the thesis",
-    "workflow/own/effect_checks.py": "effects of one's own are tried on three built-in rigs",
+    "workflow/own/effect_benches.py": "effects of one's own are tried on three built-in rigs",
     "trials/standard/campaign.py": "the standard design draws axes and running gears",
     "trials/standard/trial.py": "rolling effects are drawn on the running gear, the only built-in rig that rolls",
     "trials/handwritten/cells.py": "which rig each hidden effect of the handwritten design has",

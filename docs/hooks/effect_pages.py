@@ -12,7 +12,7 @@ from rigsight.parameters import Parameter
 from rigsight.report.labels import effect_label, listed, sentence_case
 from rigsight.report.render import equations_of
 from rigsight.rigs import RIGS
-from rigsight.workflow.own.effect_checks import ELEMENT_BENCH, bench_of
+from rigsight.workflow.own.effect_benches import ELEMENT_BENCH, bench_of
 
 _PLACES = {
     Place.ACTUATOR: "actuator",

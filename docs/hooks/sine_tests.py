@@ -17,7 +17,9 @@ from rigsight.errors import SimulationError
 from rigsight.records import Record
 from rigsight.rigs import ELEMENT, RUNNING_GEAR
 from rigsight.simulate import Structure, compose, simulate
-from rigsight.workflow.own.effect_checks import FULL, GEAR_BENCH, Bench, bench_of, start_values
+from rigsight.units import INPUT_UNIT
+from rigsight.workflow.own.effect_benches import GEAR_BENCH, Bench, bench_of
+from rigsight.workflow.own.effect_checks import FULL, start_values
 
 LEVELS = (0.3, 1.0, 3.0)
 """Amplitudes of the drive, in units of the one for which an effect's start values are scaled."""
@@ -133,8 +135,9 @@ def _first_harmonic(
 
 
 def _gain(effect: Effect, bench: Bench, values: Values, levels: tuple[float, ...]) -> Panel:
-    across = {"u": "N", "goal": "m"}.get(bench.rig.inputs[0].name, "")
-    unit = {"x": f"m/{across}", "y": "m/A", "force": "N/m"}[bench.output]
+    response = next(signal for signal in bench.rig.outputs if signal.name == bench.output)
+    source = bench.rig.inputs[0]
+    unit = f"{response.unit}/{'N' if source.unit == INPUT_UNIT else source.unit}"
     linear = np.abs(_response(compose(bench.rig), bench, values, FULL))
     structure = compose(bench.rig, [effect])
     lines = [Line(FREQUENCIES, linear, "linear rig", None)]

@@ -15,12 +15,12 @@ from rigsight.errors import InputError
 from rigsight.rigs import AXIS, RIGS
 from rigsight.simulate import compose, simulate
 from rigsight.units import parse_dimension
+from rigsight.workflow.own.effect_benches import bench_of
 from rigsight.workflow.own.effect_checks import (
     CHECKS,
     FULL,
     PER_PERIOD,
     SMALL,
-    bench_of,
     energy_of_cycles,
     is_found_again,
     last_period,

@@ -242,7 +242,7 @@ class Effect:
     needs_known_inertia
         True if it is the same as another effect where all of the inertia is a parameter.
     turns_freely
-        True for a law of an angle that no spring brings back; beside a spring another effect does the same.
+        True for a law of the angle of a joint without a spring; beside a spring another effect does the same.
     at
         Name of the joint, drive, sensor or state of a rig at which it acts; None for the first of its kind.
     """

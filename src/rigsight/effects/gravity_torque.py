@@ -1,4 +1,4 @@
-"""Gravity torque: a weight off the axis of a joint that no spring brings back.
+"""Gravity torque: a weight off the axis of a joint without a spring.
 
 Equation
 --------
@@ -29,7 +29,7 @@ GRAVITY_TORQUE = Effect(
     name="gravity_torque",
     place=Place.DYNAMICS,
     family=Family.GRAVITY,
-    summary="A weight off the axis turns a joint without a spring.",
+    summary="Gravity pulls with the sine of the angle, from any zero of the sensor.",
     parameters=(
         signed(
             "G_s",

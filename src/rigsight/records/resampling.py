@@ -229,7 +229,7 @@ def _note(
         )
         why.append(f"the signals have clocks of their own ({listed})")
     if jitter > 0.0:
-        why.append(f"time stamps jitter by up to {100.0 * jitter:.2g} % of the sample time")
+        why.append(f"time stamps jitter by up to {float(f'{100.0 * jitter:.2g}'):g} % of the sample time")
     if step is not None:
         why.append(f"resample = {step:g} is asked for")
     cost = f" Error at most about {', '.join(costs)} of the RMS, noise included." if costs else ""

@@ -17,7 +17,7 @@ from rigsight.rigs import AXIS, RIGS, RUNNING_GEAR, Rig
 from rigsight.simulate import Substeps, carries_tangents, compose, simulate, simulate_outputs
 from rigsight.simulate.equations.kinks import freeze
 from rigsight.units import characteristic_value
-from rigsight.workflow.own.effect_checks import AXIS_BENCH, GEAR_BENCH
+from rigsight.workflow.own.effect_benches import AXIS_BENCH, GEAR_BENCH
 
 DT, N_SAMPLES = 5e-3, 600
 STEP = 3e-5

@@ -25,7 +25,7 @@ FINE_STEP = 1e-6
 """Difference step of a coordinate without events: sets side by side take the same steps, so that only rounding limits it."""
 _MARGIN = 1e-9
 _BEYOND = 25.0
-"""Factor on the largest limit of a drive whose signal has a free gain: a fit without the limit takes what it cuts off for a small
+"""Factor on the largest limit of a drive whose signal has a free gain (an assumption): a fit without the limit takes what it cuts off for a small
 gain, which grows beside it. Beyond the signal itself a limit of a known gain would not act."""
 _LEAST_STIFFNESS = 1e-12
 _MOST_STIFFNESS = 1e12

@@ -117,7 +117,10 @@ def _check_effects(rig: Rig, effects: tuple[Effect, ...]) -> None:
                 f"'{rig.name}'. Set inertia in joints.{joint.name} of the rig file."
             )
         if not rig.offers(effect):
-            raise InputError(f"Effect '{effect.name}' does not apply to the rig '{rig.name}'.")
+            raise InputError(
+                f"Effect '{effect.name}' does not apply to the rig '{rig.name}'. 'rigsight effects' lists all with their kind of "
+                "place; the page of an effect says which rigs offer it."
+            )
     if len(set(names)) < len(names):
         raise InputError(f"An effect is given twice: {', '.join(names)}.")
 

@@ -1,17 +1,12 @@
 """Checks by simulation that an effect vanishes at null, stays finite, generates no energy and is recovered by a fit.
 
-Each check returns a sentence that describes the error, or None. The benches are one mass with a spring, the running gear for
-lateral effects, an element for those of a prescribed motion, and a mass that follows its goal, with its controller as the force
-of a position drive and as the signal of a drive.
+Each check returns a sentence that describes the error, or None.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -21,9 +16,16 @@ from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import Record
 from rigsight.records.record import Floats
-from rigsight.rigs import AXIS, ELEMENT, RUNNING_GEAR, Rig, joint_of, rig_of_tables
+from rigsight.rigs import joint_of
 from rigsight.simulate import compose, simulate
 from rigsight.units import characteristic_value
+from rigsight.workflow.own.effect_benches import (
+    AXIS_BENCH,
+    ELEMENT_BENCH,
+    RESONANCE,
+    Bench,
+    bench_of,
+)
 
 PER_PERIOD = 200
 """Samples per period of a sine test."""
@@ -44,95 +46,6 @@ _NOISE_ALONE = 0.05
 _SIGMAS = 4.5
 _SEEN = 0.3
 """Largest relative standard error of a parameter that counts as determined."""
-RESONANCE = 10.0
-"""Angular frequency of the axis of the sine tests [rad/s]."""
-
-
-@dataclass(frozen=True)
-class Bench:
-    """A rig with parameter values on which an effect is checked."""
-
-    # The rig and its numbers.
-    rig: Rig
-    values: dict[str, float]
-    output: str  # the output that the effect acts on
-    # The parameter values of the rig in the sweeps from which the effect must be recovered.
-    swept: dict[str, float]
-    free: tuple[str, ...]  # parameters of the rig that are fitted together with those of the effect
-
-
-AXIS_BENCH = Bench(
-    AXIS,
-    {"gain": 1.0, "m": 1.0, "d": 2.0, "k": RESONANCE**2, "x_off": 0.0, "force_off": 0.0},
-    "x",
-    {"gain": 2.0, "m": 1.5, "d": 4.0, "k": 300.0, "x_off": 1e-4, "force_off": 0.0},
-    ("m", "d", "k", "x_off"),
-)
-_GEAR_VALUES = {
-    "v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27, "J_z": 0.56, "k_c": 81.0, "k_d": 2.0, "l_0": 0.25, "c_y": 0.98,
-    "psi_off": 1e-4, "y_off": 1e-4,
-}  # fmt: skip
-GEAR_BENCH = Bench(
-    RUNNING_GEAR, _GEAR_VALUES, "y", _GEAR_VALUES, ("J_z", "k_c", "k_d", "l_0", "c_y", "psi_off", "y_off")
-)
-_SERVO: dict[str, Any] = {
-    "name": "position_drive",
-    "summary": "A mass follows its goal.",
-    "inputs": {"goal": {"unit": "m"}},
-    "constants": {"m_l": {"unit": "kg", "default": 0.6}},
-    "parameters": {
-        "m": {"unit": "kg", "lower": 1e-6},
-        "d": {"unit": "N s/m", "lower": 0.0},
-        "k_p": {"unit": "N/m", "lower": 0.0},
-        "k_v": {"unit": "N s/m", "lower": 0.0},
-    },
-    "coordinates": {"q": {"unit": "m"}},
-    "energy": {"kinetic": "(m + m_l)*d(q)^2/2"},
-    "joints": {"guide": {"motion": "q", "damping": "d"}},
-    "drives": {
-        "motor": {"signal": "goal", "force": "k_p*(motor - q) - k_v*d(q)", "along": "q"},
-    },
-    "sensors": {"x": {"reads": "q", "unit": "m"}},
-}
-_TURNING: dict[str, Any] = {
-    **_SERVO,
-    "name": "turning_drive",
-    "inputs": {"goal": {"unit": "rad"}},
-    "constants": {"m_l": {"unit": "kg m^2", "default": 0.6}},
-    "parameters": {
-        "m": {"unit": "kg m^2", "lower": 1e-6},
-        "d": {"unit": "N m s/rad", "lower": 0.0},
-        "k_p": {"unit": "N m/rad", "lower": 0.0},
-        "k_v": {"unit": "N m s/rad", "lower": 0.0},
-    },
-    "coordinates": {"q": {"unit": "rad"}},
-    "sensors": {"x": {"reads": "q", "unit": "rad"}},
-}
-_LAW = {"motor": {"signal": "k_p*(goal - x) - k_v*speed", "force": "motor", "along": "q"}}
-_SENSORS = {**_SERVO["sensors"], "speed": {"reads": "d(q)", "unit": "m/s"}}
-_SERVO_VALUES = {"m_l": 0.6, "m": 0.4, "d": 1.0, "k_p": RESONANCE**2, "k_v": 3.0}
-_ELEMENT_VALUES = {"d": 2.0, "k": RESONANCE**2, "force_off": 0.0}
-ELEMENT_BENCH = Bench(ELEMENT, _ELEMENT_VALUES, "force", _ELEMENT_VALUES, ("d", "k", "force_off"))
-
-
-@cache
-def _with_controller() -> tuple[Bench, ...]:
-    """Return the position drive, the mass whose control law is the signal of its drive, and the drive of an angle."""
-    of_law = {**_SERVO, "name": "control_law", "drives": _LAW, "sensors": _SENSORS}
-    rigs = (
-        rig_of_tables(_SERVO, "Position drive"),
-        rig_of_tables(of_law, "Control law"),
-        rig_of_tables(_TURNING, "Turning drive"),
-    )
-    return tuple(Bench(rig, _SERVO_VALUES, "x", _SERVO_VALUES, ("m", "d")) for rig in rigs)
-
-
-def bench_of(effect: Effect) -> Bench:
-    """Return the bench on which an effect is tried: the first that offers it."""
-    for bench in (AXIS_BENCH, GEAR_BENCH, ELEMENT_BENCH):
-        if bench.rig.offers(effect):
-            return bench
-    return next((bench for bench in _with_controller() if bench.rig.offers(effect)), GEAR_BENCH)
 
 
 def sine_record(
