@@ -24,9 +24,9 @@ STEP = 1e-4
 FINE_STEP = 1e-6
 """Difference step of a coordinate without events: sets side by side take the same steps, so that only rounding limits it."""
 _MARGIN = 1e-9
-_BEYOND = 25.0
-"""Factor on the largest limit of a drive whose signal has a free gain (an assumption): a fit without the limit takes what it cuts off for a small
-gain, which grows beside it. Beyond the signal itself a limit of a known gain would not act."""
+_BESIDE_FREE_GAIN = 25.0
+"""Factor on the largest limit of a drive whose signal has a free gain (an assumption): a fit without the limit takes what it cuts
+off for a small gain, which grows beside it. Beyond the signal itself a limit of a known gain would not act."""
 _LEAST_STIFFNESS = 1e-12
 _MOST_STIFFNESS = 1e12
 """Range of a stiffness with memory, in characteristic units: its logarithm is searched."""
@@ -87,7 +87,7 @@ class Coordinates:
         bounds = [_bounds(*own) for own in zip(chosen, scale, returning, strict=True)]
         lower, upper = np.array(bounds, dtype=np.float64).reshape(-1, 2).T.copy()
         beside_gain = [free.index(name) for name in _limits_beside_gain(structure, free)]
-        upper[beside_gain] *= _BEYOND
+        upper[beside_gain] *= _BESIDE_FREE_GAIN
         pairs = []
         searched = [(effect, pair) for effect in structure.effects for pair in effect.searched_as]
         for effect, pair in searched:
