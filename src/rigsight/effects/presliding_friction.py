@@ -14,8 +14,7 @@ and without friction that falls with speed. It is preferred to LuGre because rec
 these two in addition to the viscous damping. For friction that falls with speed, see Stribeck friction.
 
 Applies to ball bearings, guides and gears that reverse often or stand still under a small torque: they deflect elastically before
-they slide. As x_p goes to 0 this is Coulomb friction. Distances of more than half the motion (an
-assumption) are not searched: what hardly slides is a spring with losses, as the effects of memory are.
+they slide. As x_p goes to 0 this is Coulomb friction.
 
 Signature: stiffer at small amplitude, like an additional spring that has no effect in large motions; rounded loops at any speed;
 odd harmonics.
@@ -42,7 +41,7 @@ PRESLIDING_FRICTION = dry_friction(
             "displacement over which the friction builds up",
             "x",
             starts=(0.1, 0.3),
-            search=(1e-3, 0.5),
+            search=(1e-3, 10.0),
         ),
     ),
     torque=T_c * z / x_p,

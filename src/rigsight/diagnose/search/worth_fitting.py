@@ -132,13 +132,7 @@ def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]
     most = proposal.alone[0].share
     if most < max(SEARCH.decisive_force, proposal.by_chance):
         return everything
-    # Few stretches tell families apart that differ by less than their intervals.
-    least, _ = proposal.alone[0].interval
-    near = {
-        (c.family, c.where)
-        for c in proposal.alone
-        if c.share >= SEARCH.near_force * most or c.interval[1] >= least
-    }
+    near = {(c.family, c.where) for c in proposal.alone if c.share >= SEARCH.near_force * most}
     near |= {(cause.family, cause.where) for cause in proposal.taken}
     refined = _needless_refinements(effects, proposal.starts)
     named = tuple(
