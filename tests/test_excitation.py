@@ -11,8 +11,6 @@ from rigsight.excitation import (
     multisine,
     multisine_lines,
     step,
-    stepped_sine,
-    time_bandwidth_product,
 )
 
 T = 1e-3 * np.arange(20_001)
@@ -62,31 +60,10 @@ N = 2000
 DT = 5e-3
 
 
-def test_the_thesis_sweep_has_the_time_bandwidth_product_it_reports() -> None:
-    assert time_bandwidth_product(150.0, 1e-3, 640.0) == pytest.approx(15278.9, abs=0.05)
-
-
 def test_a_sine_has_the_crest_factor_of_a_sine() -> None:
     assert crest_factor(np.sin(2.0 * np.pi * np.arange(1000) / 100)) == pytest.approx(np.sqrt(2.0))
     with pytest.raises(InputError, match="no crest factor"):
         crest_factor(np.zeros(10))
-
-
-def test_a_stepped_sine_gives_every_frequency_its_whole_periods() -> None:
-    omega = 2.0 * np.pi * np.array([2.0, 4.0, 5.0])
-    signal = stepped_sine(T, 1.5, omega, cycles=8)
-    ends = np.concatenate([[0.0], np.cumsum(8.0 * 2.0 * np.pi / omega)])
-    for one, start, end in zip(omega, ends, ends[1:], strict=False):
-        turn = (start <= T) & (end > T)
-        np.testing.assert_allclose(signal[turn], 1.5 * np.sin(one * (T[turn] - start)), atol=1e-9)
-    assert np.all(signal[ends[-1] < T] == 0.0)
-    assert np.max(np.abs(np.diff(signal))) < 1.01 * 1.5 * omega[-1] * T[1]
-    with pytest.raises(InputError, match="give a longer duration"):
-        stepped_sine(T, 1.0, omega, cycles=100)
-    with pytest.raises(InputError, match="highest frequency must be above 0"):
-        stepped_sine(T, 1.0, np.array([1.0, 5000.0]))
-    with pytest.raises(InputError, match="at least one period"):
-        stepped_sine(T, 1.0, omega, cycles=0)
 
 
 @pytest.mark.parametrize("kind", ["full", "odd", "odd_random"])

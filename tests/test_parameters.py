@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 
-import numpy as np
 import pytest
 
 from rigsight.errors import InputError
@@ -33,8 +32,8 @@ def test_outside_the_range_the_error_names_parameter_value_and_unit(value: float
     assert f"{value:g}"[:3] in str(caught.value)
 
 
-def test_the_vector_has_the_order_of_the_parameters_not_of_the_mapping(values: ParameterSet) -> None:
-    np.testing.assert_array_equal(values.to_vector(), [2.0, 0.5, 100.0])
+def test_values_have_the_order_of_the_parameters_not_of_the_mapping(values: ParameterSet) -> None:
+    assert values.values == (2.0, 0.5, 100.0)
     assert values.names == ("m", "d", "k")
     assert [(p.name, v) for p, v in values] == [("m", 2.0), ("d", 0.5), ("k", 100.0)]
 

@@ -1,4 +1,4 @@
-"""Input signals for experiments: sweeps, steps, stepped sines, and multisines with random phases on chosen spectral lines.
+"""Input signals for experiments: sweeps, steps, and multisines with random phases on chosen spectral lines.
 
 References
 ----------
@@ -285,53 +285,6 @@ def step(t: Floats, amplitude: float, start: float) -> Floats:
         Time of the step [s].
     """
     return np.where(t >= start, amplitude, 0.0)
-
-
-def stepped_sine(t: Floats, amplitude: float, omega: Floats, cycles: int = 10) -> Floats:
-    """Return one sine after the other without a break, each for whole periods, then zero, shape (n_samples,).
-
-    Parameters
-    ----------
-    t
-        Equally spaced times [s], shape (n_samples,); the first sine begins at the first.
-    amplitude
-        Amplitude, in the unit of the input.
-    omega
-        Angular frequencies [rad/s] in the order of their turns, shape (n_frequencies,).
-    cycles
-        Periods of each frequency.
-
-    Raises
-    ------
-    InputError
-        If a frequency is not positive or above the Nyquist frequency, or the times are too short for all periods.
-    """
-    tau, duration = _elapsed(t)
-    wished = np.asarray(omega, dtype=np.float64)
-    if wished.ndim != 1 or wished.size == 0 or cycles < 1:
-        raise InputError(
-            f"A stepped sine needs frequencies of shape (n_frequencies,) and at least one period of each, got shape "
-            f"{wished.shape} and {cycles} periods."
-        )
-    _check_frequencies(t, float(wished.min()), float(wished.max()), math.ulp(0.0), ("lowest", "highest"))
-    ends = np.concatenate([[0.0], np.cumsum(2.0 * np.pi * cycles / wished)])
-    # The last period ends one sample after the last one, as the last sample of a period is not its first.
-    if ends[-1] > (duration + tau[1]) * (1.0 + 1e-9):
-        raise InputError(
-            f"{cycles} periods of {wished.size} frequencies last {ends[-1]:.4g} s, and the times {duration:.4g} s: give a longer "
-            f"duration, fewer periods or fewer low frequencies."
-        )
-    phase = np.interp(tau, ends, 2.0 * np.pi * cycles * np.arange(ends.size))
-    return np.where(tau < ends[-1], amplitude * np.sin(phase), 0.0)
-
-
-def time_bandwidth_product(duration: float, omega_start: float, omega_stop: float) -> float:
-    """Return duration [s] times the swept band, ``T |f_1 - f_0|``, from angular frequencies [rad/s].
-
-    Above some 100 the magnitude of a linear sweep's spectrum is nearly flat within the band and falls off sharply beside it
-    (thesis, section 2.1.3).
-    """
-    return duration * abs(omega_stop - omega_start) / (2.0 * math.pi)
 
 
 def _elapsed(t: Floats) -> tuple[Floats, float]:

@@ -6,9 +6,6 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rigsight.errors import InputError, check_in_range, nearest
 
 _ENDLESS = 1e100
@@ -88,10 +85,6 @@ class ParameterSet:
     def names(self) -> tuple[str, ...]:
         """Parameter names in order."""
         return tuple(parameter.name for parameter in self.parameters)
-
-    def to_vector(self) -> NDArray[np.float64]:
-        """Return the values, shape (n_parameters,)."""
-        return np.array(self.values, dtype=np.float64)
 
     def to_mapping(self) -> dict[str, float]:
         """Return name -> value."""

@@ -193,7 +193,7 @@ def _ranked(
     not_shown: list[FittedModel] = []
     duration = max(record.duration for record in context.records)
     for model in fitted:
-        is_shown = stands(model, reidentified, fitted) and not is_undetermined(model)
+        is_shown = stands(model, reidentified, fitted) and not is_undetermined(model, reidentified)
         is_shown &= not is_beyond_records(model, context.scales, duration)
         (candidates if is_shown else not_shown).append(model)
     likeliest = min(contenders(candidates), key=evidence.criterion, default=None)

@@ -106,7 +106,8 @@ def diagnosis_rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
             + (f": {labels.forms_label(cause)}" if cause.forms else "; no fit of it is a candidate"),
         )
     if diagnosis.candidates:
-        yield "candidates", "; ".join(map(_candidate, diagnosis.candidates[:_RANKED]))
+        ranked = "; ".join(map(_candidate, diagnosis.candidates[:_RANKED]))
+        yield "candidates", f"{ranked}: probability that exactly these effects are missing"
         if not diagnosis.effects:
             yield (
                 "probability",

@@ -46,6 +46,10 @@ def ranking(*models: tuple[FittedModel, float]) -> Ranking:
     return Ranking(tuple(model for model, _ in models), shares, (), grounds)
 
 
+def of_none_that_can_be_the_cause(*models: tuple[FittedModel, float]) -> Ranking:
+    return replace(ranking(*models), impossible=frozenset(model.names for model, _ in models))
+
+
 def with_cost(model: FittedModel, cost: float) -> FittedModel:
     return replace(model, fit=replace(model.fit, cost=cost))
 
@@ -101,12 +105,11 @@ def test_the_family_of_the_missing_force_is_named_where_no_simulation_explains_t
     assert shares.noise == 0.02
 
 
-def test_a_fit_that_ends_at_no_friction_is_not_named(reidentified, models) -> None:
-    absent = models["coulomb_friction"]
-    absent = with_cost(absent, reidentified.fit.cost)
+def test_a_family_none_of_whose_fits_can_be_the_cause_is_not_named(reidentified, models) -> None:
     before = Judgement("unknown", reidentified, "")
     seen = proposal(cause("coulomb_friction", 0.85))
-    assert named(before, seen, ranking((absent, 1.0)), reidentified) is before
+    order = of_none_that_can_be_the_cause((models["coulomb_friction"], 1.0))
+    assert named(before, seen, order, reidentified) is before
 
 
 @pytest.mark.parametrize(("error", "is_named"), [(10.1, True), (14.0, False)])
@@ -123,7 +126,8 @@ def test_a_force_that_simulations_do_not_see_is_named_with_its_numbers_along_the
         asked.append(start)
         return along
 
-    order = with_unseen(AXIS, reidentified, ranking((absent, 1.0)), seen, as_along_motion)
+    order = of_none_that_can_be_the_cause((absent, 1.0))
+    order = with_unseen(AXIS, reidentified, order, seen, as_along_motion)
     found = named(Judgement("unknown", reidentified, ""), seen, order, reidentified)
     assert asked == [start]
     assert (found.verdict, found.model) == (("effect", along) if is_named else ("unknown", reidentified))
@@ -139,7 +143,9 @@ def test_a_ripple_whose_phase_the_simulation_loses_is_named_although_it_would_ra
     start = ProposedStart({"T_sin": 1.0, "T_cos": 0.0, "kappa": kappa}, {})
     seen = replace(proposal(cause("torque_ripple", 0.95)), starts={"torque_ripple": start})
     along = replace(absent, error_over_noise=14.0, along_motion=True)
-    order = with_unseen(AXIS, reidentified, ranking((absent, 1.0)), seen, lambda *_: along)
+    order = with_unseen(
+        AXIS, reidentified, of_none_that_can_be_the_cause((absent, 1.0)), seen, lambda *_: along
+    )
     assert (order.order[0] is along) is is_named
 
 

@@ -56,11 +56,18 @@ def ranked(*models: FittedModel) -> Ranking:
 
 def test_an_effect_none_of_whose_numbers_the_records_determine_is_undetermined(models) -> None:
     reidentified, coulomb, stribeck = models
-    assert not any(map(is_undetermined, (reidentified, coulomb, stribeck)))
+    assert not any(is_undetermined(model, reidentified) for model in (reidentified, coulomb, stribeck))
     errors = {**coulomb.fit.standard_errors, "T_c": np.inf}
-    assert is_undetermined(replace(coulomb, fit=replace(coulomb.fit, standard_errors=errors)))
-    open_factor = dict.fromkeys(coulomb.fit.free, np.inf)
-    assert not is_undetermined(replace(coulomb, fit=replace(coulomb.fit, standard_errors=open_factor)))
+    assert is_undetermined(replace(coulomb, fit=replace(coulomb.fit, standard_errors=errors)), reidentified)
+
+
+def test_an_effect_that_opens_a_common_factor_is_undetermined_unless_it_is_open_without_it(models) -> None:
+    reidentified, coulomb, _ = models
+    beside = replace(coulomb.fit, standard_errors=dict.fromkeys(coulomb.fit.free, np.inf))
+    opened = replace(coulomb, fit=beside)
+    assert is_undetermined(opened, reidentified)
+    without = replace(reidentified.fit, standard_errors=dict.fromkeys(reidentified.fit.free, np.inf))
+    assert not is_undetermined(opened, replace(reidentified, fit=without))
 
 
 def test_plain_numbers_leave_no_doubt(models) -> None:

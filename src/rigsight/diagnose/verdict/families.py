@@ -17,7 +17,6 @@ import numpy as np
 from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.noise.block_means import squared_errors
 from rigsight.diagnose.policy import FAMILIES, SEARCH
-from rigsight.diagnose.verdict.plausibility import stands
 from rigsight.effects import Effect, Family
 from rigsight.inverse import Proposal
 from rigsight.records.record import Floats
@@ -110,7 +109,7 @@ def families_at_places(
     of_sets = {key_set: [i for i, own in enumerate(keys) if own == key_set] for key_set in set(keys)}
     causes = {} if proposal is None else {(c.family, c.where): c for c in proposal.alone}
     of_rank = [own[2] for own in usable]
-    main = _weighed(rig, reidentified, models, of_rank, explained, proposal, impossible)
+    main = _weighed(rig, models, of_rank, explained, proposal, impossible)
     found = []
     for key in dict.fromkeys(itertools.chain(own_keys, *keys)):
         members = [i for i, own in enumerate(keys) if key in own]
@@ -177,7 +176,7 @@ def main_causes(
     squares = squared_errors([reidentified.residuals, *(model.residuals for model, _ in usable)], noise)
     explained = np.asarray(1.0 - squares.mean[1:] / squares.mean[0])
     models, shares = [model for model, _ in usable], [share for _, share in usable]
-    return _weighed(rig, reidentified, models, shares, explained, proposal, impossible)
+    return _weighed(rig, models, shares, explained, proposal, impossible)
 
 
 def probable_part(
@@ -203,7 +202,6 @@ def probable_part(
 
 def _weighed(
     rig: Rig,
-    reidentified: FittedModel,
     models: Sequence[FittedModel],
     of_rank: Sequence[float],
     explained: Floats,
@@ -213,16 +211,12 @@ def _weighed(
     """Return how probable each family is as the main cause where no law is exact."""
     # A family that leaves the share r of a squared error is 1/r^n times as probable as one that explains nothing: n is half the
     # number of independent pieces of evidence that law errors leave in records. Simulation and motion are asked, and the share of
-    # the ranking, which also knows which parameters are plausible; it counts as far as the best simulation explains the gap. The
-    # motion says nothing of a family all of whose fits end at a size of zero, unless simulations do not see its force. What
-    # cannot be the cause explains nothing.
+    # the ranking, which also knows which parameters are plausible; it counts as far as the best simulation explains the gap. What
+    # cannot be the cause explains nothing, and the motion says nothing of a family none of whose fits can be, unless simulations
+    # do not see its force.
     counts = float(np.clip(np.max(explained, initial=0.0), 0.0, 1.0))
     keys = [frozenset(keys_of(rig, model.effects)) for model in models]
-    counting = [
-        own
-        for model, own in zip(models, keys, strict=True)
-        if model.along_motion or stands(model, reidentified, models)
-    ]
+    counting = [own for model, own in zip(models, keys, strict=True) if model.names not in impossible]
     of_motion: dict[Key, float] = {}
     if proposal is not None:
         per_share = FAMILIES.per_motion * (1.0 - proposal.by_chance)
@@ -233,7 +227,7 @@ def _weighed(
             key
             for model, own in zip(models, keys, strict=True)
             for key in own
-            if proposal.undecided & set(model.names) and stands(model, reidentified, models)
+            if proposal.undecided & set(model.names) and model.names not in impossible
         }
         of_motion |= dict.fromkeys(open_to_motion, max(of_motion.values(), default=0.0))
     weights = {}

@@ -16,7 +16,6 @@ from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.noise.block_means import squared_errors
 from rigsight.diagnose.policy import FAMILIES, VERDICT
 from rigsight.diagnose.verdict.families import FamilyAtPlace, Key, keys_of, main_causes
-from rigsight.diagnose.verdict.plausibility import stands
 from rigsight.diagnose.verdict.ranking import Ranking
 from rigsight.effects import Effect
 from rigsight.inverse import MissingForce, Proposal, ProposedStart
@@ -221,7 +220,7 @@ def with_unseen(
         alone = [m for m in forms if len(m.effects) == 1 and m.names[0] in proposal.starts]
         starts = [(proposal.starts[m.names[0]], m) for m in alone]
         is_seen = any(
-            m.error_over_noise <= reidentified.error_over_noise and stands(m, reidentified, ranking.order)
+            m.error_over_noise <= reidentified.error_over_noise and m.names not in ranking.impossible
             for m in forms
         )
         is_shown = cause.effect.torque is not None and cause.share >= max(
@@ -275,9 +274,7 @@ def by_motion(
         return judgement
     if judgement.verdict == "effect" and key in keys_of(rig, judgement.model.effects):
         return judgement
-    forms = [
-        m for m in _of_family(rig, ranking, key) if m.along_motion or stands(m, reidentified, ranking.order)
-    ]
+    forms = [m for m in _of_family(rig, ranking, key) if m.names not in ranking.impossible]
     if not forms:
         return judgement
     of_rank = {model.names: share for model, share in zip(ranking.order, shares, strict=True)}

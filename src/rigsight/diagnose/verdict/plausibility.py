@@ -65,15 +65,15 @@ def doubts(model: FittedModel, reidentified: FittedModel) -> tuple[Doubt, ...]:
     return tuple(found)
 
 
-def is_undetermined(model: FittedModel) -> bool:
-    """Return True if the records determine no parameter of an effect of a model, though they determine those of the rig."""
-    # Where those of the rig are not determined either, a common factor may be open: an effect is then determined relative to it.
-    fit = model.fit
-    own = [[fit.structure.parameter_name(e, p.name) for p in e.parameters] for e in model.effects]
-    of_rig = [fit.standard_errors[name] for name in fit.free if not any(name in names for names in own)]
-    of_effects = [[fit.standard_errors[name] for name in names if name in fit.free] for names in own]
-    unknown = any(errors and not np.any(np.isfinite(errors)) for errors in of_effects)
-    return unknown and bool(np.all(np.isfinite(of_rig)))
+def is_undetermined(model: FittedModel, reidentified: FittedModel) -> bool:
+    """Return True if the records determine no parameter of an effect of a model, but those of the equations without it."""
+    # An effect that opens a common factor of all numbers is no cause: a drive always at its limit is one of a smaller gain. Where
+    # that factor is open without it, the effect is determined relative to it.
+    fit, without = model.fit, reidentified.fit
+    of_effects = [[fit.structure.parameter_name(e, p.name) for p in e.parameters] for e in model.effects]
+    errors = [[fit.standard_errors[name] for name in names if name in fit.free] for names in of_effects]
+    unknown = any(own and not np.any(np.isfinite(own)) for own in errors)
+    return unknown and bool(np.all(np.isfinite([without.standard_errors[name] for name in without.free])))
 
 
 def has_size_of_zero(model: FittedModel, others: Sequence[FittedModel]) -> bool:

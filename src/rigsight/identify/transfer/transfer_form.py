@@ -166,11 +166,6 @@ class TransferFit:
     free_motion: Floats = field(default_factory=lambda: np.zeros(0))
     free_motion_covariance: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
-    @property
-    def residual_rms(self) -> float:
-        """RMS of the residuals, in the unit of the fitted quantity."""
-        return float(np.sqrt(np.mean(np.abs(self.residuals) ** 2)))
-
     def covariance_of(self, *names: str) -> Floats:
         """Return the covariance of some parameters in the order given, shape (n, n)."""
         rows = [self.names.index(name) for name in names]
