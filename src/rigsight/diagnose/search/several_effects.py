@@ -80,13 +80,23 @@ class SeveralEffects:
 
     def _pool(self) -> list[FittedModel]:
         """Return the causes that the motion names, with further ones, and sets of those that it does not judge."""
-        models = list(self._grown(self.singles[0]))
+        judged = frozenset[str]() if self.proposal is None else self.proposal.judged
+        models = list(self._grown(self.singles[0], judged))
+        # An effect that imitates several causes may lead, and none of them helps it further.
+        named = [model for single in self._named_first() for model in self._grown(single)]
+        models += [model for model in named if self._is_worth(model, self.singles[0])]
         # A delay and a resonance may hide each other: neither lowers the error without the other.
         if not models or not self.is_settled(min(models, key=_error)):
             for size in (2, 3):
                 sets = self.together.fitted(size, self._least_share)
                 models += [one for one in sets if self._is_worth(one, self.singles[0])]
         return models
+
+    def _named_first(self) -> list[FittedModel]:
+        """Return the best single of the first family that the motion names, if a single of another one is the best."""
+        taken = () if self.proposal is None else self.proposal.taken[:1]
+        keys = {(cause.family, cause.where) for cause in taken} - self._keys(self.singles[0])
+        return [single for single in self.singles if self._keys(single) <= keys and single.effects][:1]
 
     def _reduced(self, model: FittedModel) -> tuple[list[FittedModel], list[FittedModel]]:
         """Return a model and what remains of it each time that a needless effect is dropped, and the parts of the last."""
@@ -105,12 +115,14 @@ class SeveralEffects:
         # The regression along the motion has no other minimum to start from.
         return each_once(refined if self.proposal is not None else in_lowest_basins(self.context, refined))
 
-    def _grown(self, model: FittedModel) -> Iterator[FittedModel]:
-        """Yield the causes that the motion names, where they explain more, then with each further one that lowers the error."""
+    def _grown(self, model: FittedModel, judged: frozenset[str] = frozenset()) -> Iterator[FittedModel]:
+        """Yield the causes that the motion names, where they explain more, then with each further one that lowers the error.
+
+        Of the effects that the motion has judged only those are tried that it names beside the model.
+        """
         if self.named is not None and self._is_worth(self.named, model):
             model = self.named
             yield model
-        judged = frozenset[str]() if self.proposal is None else self.proposal.judged
         enough = np.inf if self.proposal is not None else VERDICT.at_floor
         for _ in range(SEARCH.most_unnamed):
             if self.is_settled(model):

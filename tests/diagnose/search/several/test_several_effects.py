@@ -21,6 +21,7 @@ from rigsight.effects import Effect, effect_named
 from rigsight.excitation import linear_sweep, step
 from rigsight.identify import characteristic_scales
 from rigsight.identify.fit.windows import Windowing
+from rigsight.inverse import Proposal, ProposedCause
 from rigsight.records.record import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
@@ -124,6 +125,25 @@ def searching(
         return model.error_over_noise <= VERDICT.at_floor
 
     return SeveralEffects(context, singles, None, None, effects, together, lambda _: None, np.inf, is_settled)
+
+
+def test_the_search_goes_on_from_what_the_motion_names_where_another_effect_leads() -> None:
+    """Nothing helps an effect further that imitates several causes; the first that the motion names is one of them."""
+    hidden = {"actuator_lag": {"T_a": 0.03}, "asymmetric_stiffness": {"k_2": 500.0}}
+    context = context_of(measured(hidden, seed=0), frozenset({"force_off"}))
+    effects = [effect_named(name) for name in ("quadratic_damping", *hidden)]
+    without = reidentify(context, VALUES)
+    singles = [fit_candidate(context, (effect,), without.fit) for effect in effects[:2]]
+    late = ProposedCause(effects[1], effects[1].family, AXIS.where(effects[1]), 0.6, {})
+    judged = frozenset(effect.name for effect in effects)
+    search = replace(
+        searching(context, without, singles, effects),
+        together=Together(context, without, ()),
+        proposal=Proposal((late,), (late,), judged, explained=0.6, by_chance=0.1),
+        enough=0.0,
+    )
+    assert frozenset(hidden) in {frozenset(model.names) for model in search.found()}
+    assert replace(search, singles=singles[:1]).found() == []
 
 
 @pytest.mark.slow
