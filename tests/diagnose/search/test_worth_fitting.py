@@ -52,6 +52,12 @@ def test_of_families_that_explain_the_force_only_together_the_forms_that_were_ta
     assert worth.explained == 0.95
 
 
+def test_a_weight_is_fitted_beside_a_ripple() -> None:
+    """It is a ripple of one period a turn, at which the motion alone need not show it."""
+    assert "gravity_torque" in fitted(cause("torque_ripple", 0.8))
+    assert "gravity_torque" not in fitted(cause("encoder_eccentricity", 0.8))
+
+
 def test_a_form_of_a_form_is_fitted_where_the_motion_shows_it() -> None:
     """LuGre friction contains presliding and Stribeck friction, which contain Coulomb friction; a loop is another family."""
     best, loop = cause("coulomb_friction", 0.8), cause("bouc_wen_hysteresis", 0.79)

@@ -146,6 +146,9 @@ def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]
     if is_shown and is_rich and min(beside, proposal.explained) >= VERDICT.larger_part:
         # No family alone follows the motion: other forms are tried beside the families that explain it together.
         named = proposal.effects
+    # A weight is a ripple of one period a turn, with one number less.
+    rippled = {rig.where(e) for e in named if e.wave_number is not None and e.torque is not None}
+    named += tuple(e for e in effects if e.turns_freely and rig.where(e) in rippled and e not in named)
     kept = tuple(e for e in effects if e.name not in proposal.judged or e in named)
     most = max(most, proposal.explained)
     return WorthFitting(kept, named, is_shown, proposal.undecided, most, proposal.starts)
