@@ -27,6 +27,7 @@ from rigsight.diagnose.verdict.families import keys_of, probable_part
 from rigsight.diagnose.verdict.judgement import (
     Judgement,
     by_motion,
+    forms_like,
     is_exact,
     judge,
     main_cause,
@@ -122,14 +123,21 @@ def examine(
     is_reached = best.error_over_noise <= allowed and not lower_bound
     if len(best.effects) > 1 and not (is_reached or checks.is_adequate(best)):
         best = probable_part(campaign.rig, reidentified, best, ranking.order)
-    judgement = judge(
-        before.error_over_noise,
-        reidentified,
-        best,
-        checks.is_adequate,
-        lambda: main_cause(campaign.rig, reidentified, best, tied, context.floors, rng),
-        lower_bound,
-    )
+
+    def judged(model: FittedModel) -> Judgement:
+        return judge(
+            before.error_over_noise,
+            reidentified,
+            model,
+            checks.is_adequate,
+            lambda: main_cause(campaign.rig, reidentified, model, tied, context.floors, rng),
+            lower_bound,
+        )
+
+    judgement = judged(best)
+    if judgement.verdict == "unknown" and best.effects:
+        forms = map(judged, forms_like(campaign.rig, ranking, best))
+        judgement = next((own for own in forms if own.verdict == "effect"), judgement)
     if not is_exact(judgement, best, allowed, checks.is_adequate):
         proposal, along = models.alone.proposal, partial(as_along_motion, context, reidentified)
         ranking = with_unseen(campaign.rig, reidentified, ranking, proposal, along)

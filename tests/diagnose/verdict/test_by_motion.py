@@ -18,6 +18,7 @@ from rigsight.diagnose.verdict.families import (
 from rigsight.diagnose.verdict.judgement import (
     Judgement,
     by_motion,
+    forms_like,
     is_exact,
     with_most_probable_family,
     with_unseen,
@@ -110,6 +111,13 @@ def test_a_family_none_of_whose_fits_can_be_the_cause_is_not_named(reidentified,
     seen = proposal(cause("coulomb_friction", 0.85))
     order = of_none_that_can_be_the_cause((models["coulomb_friction"], 1.0))
     assert named(before, seen, order, reidentified) is before
+
+
+def test_forms_of_a_family_are_asked_in_the_order_of_the_ranking(models) -> None:
+    plain, rounded, other = models.values()
+    order = ranking((plain, 0.3), (other, 0.1), (rounded, 0.6))
+    assert forms_like(AXIS, order, plain) == [rounded, plain]
+    assert forms_like(AXIS, replace(order, impossible=frozenset({rounded.names})), plain) == [plain]
 
 
 @pytest.mark.parametrize(("error", "is_named"), [(10.1, True), (14.0, False)])

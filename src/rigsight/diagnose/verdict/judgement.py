@@ -188,6 +188,17 @@ def _listed(models: Sequence[FittedModel]) -> str:
     return "; ".join(", ".join(model.names) for model in models[:3])
 
 
+def forms_like(rig: Rig, ranking: Ranking, model: FittedModel) -> list[FittedModel]:
+    """Return the models with the families of a model that can be the cause, the one with the largest share of the ranking first.
+
+    The plainest form may explain less than half of the gap, and another one more: it is the family that is asked.
+    """
+    family = keys_of(rig, model.effects)
+    shares = zip(ranking.order, ranking.probabilities, strict=True)
+    forms = [(share, m) for m, share in shares if m.residuals and keys_of(rig, m.effects) == family]
+    return [m for _, m in sorted(forms, key=lambda form: -form[0]) if m.names not in ranking.impossible]
+
+
 def is_exact(
     judgement: Judgement,
     best: FittedModel,
