@@ -84,3 +84,21 @@ def test_beside_a_known_delay_friction_is_named() -> None:
     assert found is not None
     assert found.alone[0].family == "dry_friction"
     assert found.alone[0].share > 0.8
+
+
+def test_beside_a_delay_whose_number_is_called_as_one_of_a_friction_the_motion_is_asked() -> None:
+    """Both have a T_s: it carries the name of its effect beside the delay, and does not without it."""
+    modelled = effect_named("sensor_delay"), effect_named("stribeck_friction")
+    structure = compose(AXIS, modelled)
+    own = {"sensor_delay": {"T_s": 0.02}, "stribeck_friction": {"T_c": 1.0, "T_s": 1.5, "w_s": 0.1}}
+    numbers = {
+        structure.parameter_name(effect, name): value
+        for effect in modelled
+        for name, value in own[effect.name].items()
+    }
+    assert "T_s" not in numbers
+    late = campaign(AXIS, {**AXIS_VALUES, **numbers}, list(modelled), (10.0, 20.0))
+    late = replace(late, modelled=modelled)
+    found = propose(late, {**late.constants, **late.given, **numbers}, [effect_named("cubic_stiffness")])
+    assert found is not None
+    assert found.numbers["T_s"] == pytest.approx(1.5, rel=0.1)

@@ -136,7 +136,7 @@ def _with_finer_grid(selection: Selection, terms_of: EffectTerms) -> Selection:
 def along_motion(campaign: Campaign, known: Mapping[str, float]) -> EffectTerms | None:
     """Return effects as terms of the equations along the motion of the estimation records; None as for `propose`."""
     rig = campaign.rig
-    campaign = _in_time(campaign, known)
+    campaign, known = _in_time(campaign, known)
     if rig.mechanism.bodies is not None or not all(map(is_joint_force, campaign.modelled)):
         return None
     try:
@@ -167,12 +167,12 @@ def numbers_along_motion(campaign: Campaign, known: Mapping[str, float]) -> dict
     return {p.name: values[p.name] for p in campaign.rig.parameters}
 
 
-def _in_time(campaign: Campaign, known: Mapping[str, float]) -> Campaign:
-    """Return a campaign without its modelled delays and lags, if known: what they make late is moved to its time."""
+def _in_time(campaign: Campaign, known: Mapping[str, float]) -> tuple[Campaign, Mapping[str, float]]:
+    """Return a campaign without its modelled delays and lags, if known, and all numbers: what is late is moved to its time."""
     structure = compose(campaign.rig, campaign.modelled)
     records = campaign.records
     if not all(name in known for name in structure.names):
-        return campaign
+        return campaign, known
     for effect in filter(is_late, campaign.modelled):
         numbers = {p.name: known[structure.parameter_name(effect, p.name)] for p in effect.parameters}
         place, late = campaign.rig.acts_at(effect), lateness(effect, numbers)
@@ -184,11 +184,18 @@ def _in_time(campaign: Campaign, known: Mapping[str, float]) -> Campaign:
             }
             signals, late = inputs.pop(place), -late
             if any(signals & others for others in inputs.values()):
-                return campaign  # The other drive is in time.
+                return campaign, known  # The other drive is in time.
         moved = [{n: shifted(r[n], r.dt, late) for n in signals if n in r} for r in records]
         records = tuple(r.with_signals(**own) for r, own in zip(records, moved, strict=True))
     kept = tuple(effect for effect in campaign.modelled if not is_late(effect))
-    return replace(campaign, records=records, modelled=kept)
+    # A number loses the name of its effect where no other one has the same any more.
+    fewer = compose(campaign.rig, kept)
+    own = {
+        fewer.parameter_name(effect, p.name): known[structure.parameter_name(effect, p.name)]
+        for effect in kept
+        for p in effect.parameters
+    }
+    return replace(campaign, records=records, modelled=kept), {**known, **own}
 
 
 def _fitted(campaign: Campaign, known: Mapping[str, float]) -> tuple[EquationFit, dict[str, float]]:
