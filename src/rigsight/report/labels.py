@@ -111,9 +111,9 @@ def forms_label(own: FamilyAtPlace) -> str:
     )
 
 
-def share_label(own: FamilyAtPlace) -> str:
-    """Return the share of the gap of a family with its interval: ``"81 % (74 % to 86 %)"``."""
-    low, high = map(percent, own.interval)
+def share_label(own: FamilyAtPlace | ProposedCause) -> str:
+    """Return the share of the gap of a family with its interval: ``"81 % (74 % to 86 %)"``; below zero it explains nothing."""
+    low, high = (percent(max(0.0, end)) for end in own.interval)
     return f"{percent(own.share)} ({low} to {high})"
 
 
