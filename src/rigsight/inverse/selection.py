@@ -56,6 +56,8 @@ class Selection:
         self.fit, self.values, self.terms = fit, values, list[Term]()
         self.places: list[list[int]] = []
         self.regression = Regression(fit, values, noise)
+        # What each term leaves beside chosen columns, None where it cannot: further terms change nothing of it.
+        self._known: dict[tuple[int, ...], dict[int, float | None]] = {}
         # Limit of the largest share of the squares that one of so many columns explains (Bonferroni): the share that a column
         # explains by chance has a beta distribution. What laws leave moves with the motion: in its band lie fewer rows than in
         # that of the forces. The numbers of the equations have taken their part of them.
@@ -88,7 +90,7 @@ class Selection:
     def with_regression(self, regression: Regression) -> Selection:
         """Return the selection of the same terms by a regression on changed records."""
         changed = copy(self)
-        changed.regression = regression
+        changed.regression, changed._known = regression, {}
         return changed
 
     def leading(self, rig: Rig) -> list[Term]:
@@ -129,9 +131,14 @@ class Selection:
         self, chosen: Sequence[int], asked: Sequence[int] | None = None
     ) -> Iterator[tuple[int, float]]:
         """Yield each (asked) term that can have the sign and order that it needs beside chosen columns, and what it leaves."""
+        known = self._known.setdefault(tuple(chosen), {})
         for i in range(len(self.terms)) if asked is None else asked:
-            if self.allows(i, chosen):
-                yield i, self.regression.remainder([*chosen, *self.places[i]])
+            if i not in known:
+                beside = [*chosen, *self.places[i]]
+                known[i] = self.regression.remainder(beside) if self.allows(i, chosen) else None
+            own = known[i]
+            if own is not None:
+                yield i, own
 
     def allows(self, i: int, chosen: Sequence[int]) -> bool:
         """Return whether a term has the sign and order that it needs beside chosen columns."""
