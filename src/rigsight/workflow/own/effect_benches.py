@@ -44,39 +44,31 @@ _GEAR_VALUES = {
 GEAR_BENCH = Bench(
     RUNNING_GEAR, _GEAR_VALUES, "y", _GEAR_VALUES, ("J_z", "k_c", "k_d", "l_0", "c_y", "psi_off", "y_off")
 )
-_SERVO: dict[str, Any] = {
-    "name": "position_drive",
-    "summary": "A mass follows its goal.",
-    "inputs": {"goal": {"unit": "m"}},
-    "constants": {"m_l": {"unit": "kg", "default": 0.6}},
-    "parameters": {
-        "m": {"unit": "kg", "lower": 1e-6},
-        "d": {"unit": "N s/m", "lower": 0.0},
-        "k_p": {"unit": "N/m", "lower": 0.0},
-        "k_v": {"unit": "N s/m", "lower": 0.0},
-    },
-    "coordinates": {"q": {"unit": "m"}},
-    "energy": {"kinetic": "(m + m_l)*d(q)^2/2"},
-    "joints": {"guide": {"motion": "q", "damping": "d"}},
-    "drives": {
-        "motor": {"signal": "goal", "force": "k_p*(motor - q) - k_v*d(q)", "along": "q"},
-    },
-    "sensors": {"x": {"reads": "q", "unit": "m"}},
-}
-_TURNING: dict[str, Any] = {
-    **_SERVO,
-    "name": "turning_drive",
-    "inputs": {"goal": {"unit": "rad"}},
-    "constants": {"m_l": {"unit": "kg m^2", "default": 0.6}},
-    "parameters": {
-        "m": {"unit": "kg m^2", "lower": 1e-6},
-        "d": {"unit": "N m s/rad", "lower": 0.0},
-        "k_p": {"unit": "N m/rad", "lower": 0.0},
-        "k_v": {"unit": "N m s/rad", "lower": 0.0},
-    },
-    "coordinates": {"q": {"unit": "rad"}},
-    "sensors": {"x": {"reads": "q", "unit": "rad"}},
-}
+
+
+def _drive(name: str, inertia: str, force: str, position: str) -> dict[str, Any]:
+    """Return the rig file of a mass that follows its goal, in the units of its motion."""
+    return {
+        "name": name,
+        "summary": "A mass follows its goal.",
+        "inputs": {"goal": {"unit": position}},
+        "constants": {"m_l": {"unit": inertia, "default": 0.6}},
+        "parameters": {
+            "m": {"unit": inertia, "lower": 1e-6},
+            "d": {"unit": f"{force} s/{position}", "lower": 0.0},
+            "k_p": {"unit": f"{force}/{position}", "lower": 0.0},
+            "k_v": {"unit": f"{force} s/{position}", "lower": 0.0},
+        },
+        "coordinates": {"q": {"unit": position}},
+        "energy": {"kinetic": "(m + m_l)*d(q)^2/2"},
+        "joints": {"guide": {"motion": "q", "damping": "d"}},
+        "drives": {"motor": {"signal": "goal", "force": "k_p*(motor - q) - k_v*d(q)", "along": "q"}},
+        "sensors": {"x": {"reads": "q", "unit": position}},
+    }
+
+
+_SERVO = _drive("position_drive", "kg", "N", "m")
+_TURNING = _drive("turning_drive", "kg m^2", "N m", "rad")
 _LAW = {"motor": {"signal": "k_p*(goal - x) - k_v*speed", "force": "motor", "along": "q"}}
 _SENSORS = {**_SERVO["sensors"], "speed": {"reads": "d(q)", "unit": "m/s"}}
 _SERVO_VALUES = {"m_l": 0.6, "m": 0.4, "d": 1.0, "k_p": RESONANCE**2, "k_v": 3.0}
