@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 _NAMES = 9.0
 """Size of letters beside bars [points]."""
+_ERRORS = 8.5
+"""Size of letters of an error at the end of its bar [points]."""
 _LONGEST_NAME = 42
 """Letters of a name on one line."""
 _FURTHER_LINE = 0.5
@@ -193,18 +195,23 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
         error = candidate.error_over_noise
         ax.barh(row, error - left, left=left, height=0.62, color=color, hatch=hatch, edgecolor="white")
         ax.annotate(f"{error:.3g} ×", (max(error, left), row), (4, 0),
-                    textcoords="offset points", va="center", fontsize=8.5, color=FLOOR)  # fmt: skip
+                    textcoords="offset points", va="center", fontsize=_ERRORS, color=FLOOR)  # fmt: skip
     ax.set_xscale("log")
-    ax.set_xlim(left, right * (right / left) ** 0.12)
+    lines = [line for name in shown for line in name.split("\n")]
+    margins = 0.14 + text_width(lines, _NAMES), 0.1
+    # The longest bar leaves room for an error beside it.
+    room = (text_width([f"{error:.3g} × " for error in finite], _ERRORS) + 4 / 72) / (
+        PAGE_WIDTH - sum(margins)
+    )
+    ax.set_xlim(left, right * (right / left) ** (room / (1.0 - room)))
     plain_log_ticks(ax, left, right)
     ax.axvline(1.0, **FLOOR_LINE)
     ax.set_yticks(rows[: len(shown)], shown)
     ax.set_ylim(sum(heights) + 0.05, -0.05)
     ax.tick_params(axis="y", length=0)
     ax.grid(axis="x")
-    ax.set_xlabel("residual RMS / noise floor (dashed: 1, perfect)")
-    lines = [line for name in shown for line in name.split("\n")]
-    set_margins(figure, 0.14 + text_width(lines, _NAMES), 0.1, 0.48, 0.08)
+    ax.set_xlabel("residual RMS / noise floor")
+    set_margins(figure, *margins, 0.48, 0.08)
     return figure
 
 

@@ -92,7 +92,7 @@ def ranking_figure(diagnosis: Diagnosis) -> PageFigure:
         ranking_drawing(diagnosis),
         "figure-ranking",
         f"Bars of the error of each candidate in units of the noise floor: {', '.join(scored[:16])}.",
-        f"Error of each candidate; shorter is better.{named}{hatched}",
+        f"Error of each candidate; shorter is better. Dashed: the noise floor, which a perfect model leaves.{named}{hatched}",
     )
 
 

@@ -107,7 +107,7 @@ def diagnosis_rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
         )
     if diagnosis.candidates:
         ranked = "; ".join(map(_candidate, diagnosis.candidates[:_RANKED]))
-        yield "candidates", f"{ranked}: probability that exactly these effects are missing"
+        yield "candidates", f"probability that exactly these are missing: {ranked}"
         if not diagnosis.effects:
             yield (
                 "probability",
