@@ -27,7 +27,7 @@ from rigsight.diagnose.verdict.families import keys_of, probable_part
 from rigsight.diagnose.verdict.judgement import (
     Judgement,
     by_motion,
-    forms_like,
+    forms_of,
     is_exact,
     judge,
     main_cause,
@@ -136,7 +136,8 @@ def examine(
 
     judgement = judged(best)
     if judgement.verdict == "unknown" and best.effects:
-        forms = map(judged, forms_like(campaign.rig, ranking, best))
+        # The plainest form of a family may explain less than half of the gap, and another one more.
+        forms = map(judged, forms_of(campaign.rig, ranking, keys_of(campaign.rig, best.effects)))
         judgement = next((own for own in forms if own.verdict == "effect"), judgement)
     if not is_exact(judgement, best, allowed, checks.is_adequate):
         proposal, along = models.alone.proposal, partial(as_along_motion, context, reidentified)

@@ -12,13 +12,14 @@ from rigsight.diagnose.policy import FAMILIES
 from rigsight.diagnose.verdict.families import (
     FamilyAtPlace,
     families_at_places,
+    keys_of,
     main_causes,
     shares_of_force,
 )
 from rigsight.diagnose.verdict.judgement import (
     Judgement,
     by_motion,
-    forms_like,
+    forms_of,
     is_exact,
     with_most_probable_family,
     with_unseen,
@@ -116,8 +117,9 @@ def test_a_family_none_of_whose_fits_can_be_the_cause_is_not_named(reidentified,
 def test_forms_of_a_family_are_asked_in_the_order_of_the_ranking(models) -> None:
     plain, rounded, other = models.values()
     order = ranking((plain, 0.3), (other, 0.1), (rounded, 0.6))
-    assert forms_like(AXIS, order, plain) == [rounded, plain]
-    assert forms_like(AXIS, replace(order, impossible=frozenset({rounded.names})), plain) == [plain]
+    friction = keys_of(AXIS, plain.effects)
+    assert forms_of(AXIS, order, friction) == [rounded, plain]
+    assert forms_of(AXIS, replace(order, impossible=frozenset({rounded.names})), friction) == [plain]
 
 
 @pytest.mark.parametrize(("error", "is_named"), [(10.1, True), (14.0, False)])

@@ -6,7 +6,7 @@ cause is open. What a main cause leaves is the remainder: on a measured rig no l
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -188,15 +188,17 @@ def _listed(models: Sequence[FittedModel]) -> str:
     return "; ".join(", ".join(model.names) for model in models[:3])
 
 
-def forms_like(rig: Rig, ranking: Ranking, model: FittedModel) -> list[FittedModel]:
-    """Return the models with the families of a model that can be the cause, the one with the largest share of the ranking first.
-
-    The plainest form may explain less than half of the gap, and another one more: it is the family that is asked.
-    """
-    family = keys_of(rig, model.effects)
-    shares = zip(ranking.order, ranking.probabilities, strict=True)
-    forms = [(share, m) for m, share in shares if m.residuals and keys_of(rig, m.effects) == family]
-    return [m for _, m in sorted(forms, key=lambda form: -form[0]) if m.names not in ranking.impossible]
+def forms_of(rig: Rig, ranking: Ranking, families: Iterable[Key]) -> list[FittedModel]:
+    """Return the models of just these families that can be the cause, the one with the largest share of the ranking first."""
+    wanted = frozenset(families)
+    forms = [
+        (grounds.share, model)
+        for model, grounds in zip(ranking.order, ranking.grounds, strict=True)
+        if model.residuals
+        and model.names not in ranking.impossible
+        and frozenset(keys_of(rig, model.effects)) == wanted
+    ]
+    return [model for _, model in sorted(forms, key=lambda form: -form[0])]
 
 
 def is_exact(
@@ -285,11 +287,10 @@ def by_motion(
         return judgement
     if judgement.verdict == "effect" and key in keys_of(rig, judgement.model.effects):
         return judgement
-    forms = [m for m in _of_family(rig, ranking, key) if m.names not in ranking.impossible]
+    forms = forms_of(rig, ranking, [key])
     if not forms:
         return judgement
-    of_rank = {model.names: share for model, share in zip(ranking.order, shares, strict=True)}
-    form = max(forms, key=lambda m: (m.along_motion, of_rank[m.names], -m.error_over_noise))
+    form = max(forms, key=lambda own: own.along_motion)
     simulated = form.error_over_noise / reidentified.error_over_noise
     return Judgement(
         "effect",
@@ -308,15 +309,10 @@ def with_most_probable_family(
     if judgement.verdict != "effect" or judgement.by_motion or len(own) != 1 or not families:
         return judgement
     most = max(families, key=lambda family: family.probability)
-    forms = [
-        (grounds.share, model)
-        for model, grounds in zip(ranking.order, ranking.grounds, strict=True)
-        if keys_of(rig, model.effects) == ((most.family, most.where),)
-        and model.names not in ranking.impossible
-    ]
+    forms = forms_of(rig, ranking, [(most.family, most.where)])
     if (most.family, most.where) in own or not forms:
         return judgement
-    _, form = max(forms, key=lambda each: each[0])
+    form = forms[0]
     return replace(
         judgement,
         model=form,
