@@ -81,15 +81,19 @@ class SeveralEffects:
     def _pool(self) -> list[FittedModel]:
         """Return the causes that the motion names, with further ones, and sets of those that it does not judge."""
         judged = frozenset[str]() if self.proposal is None else self.proposal.judged
-        models = list(self._grown(self.singles[0], judged))
-        # An effect that imitates several causes may lead, and none of them helps it further.
-        named = [model for single in self._named_first() for model in self._grown(single)]
-        models += [model for model in named if self._is_worth(model, self.singles[0])]
+        best = self.singles[0]
+        if self.named is not None and self._is_worth(self.named, best):
+            models = [self.named, *self._grown(self.named, judged)]
+        else:
+            models = list(self._grown(best, judged))
+            # An effect that imitates several causes may lead, and none of them helps it further.
+            further = [model for single in self._named_first() for model in self._grown(single)]
+            models += [model for model in further if self._is_worth(model, best)]
         # A delay and a resonance may hide each other: neither lowers the error without the other.
         if not models or not self.is_settled(min(models, key=_error)):
             for size in (2, 3):
                 sets = self.together.fitted(size, self._least_share)
-                models += [one for one in sets if self._is_worth(one, self.singles[0])]
+                models += [one for one in sets if self._is_worth(one, best)]
         return models
 
     def _named_first(self) -> list[FittedModel]:
@@ -116,13 +120,8 @@ class SeveralEffects:
         return each_once(refined if self.proposal is not None else in_lowest_basins(self.context, refined))
 
     def _grown(self, model: FittedModel, judged: frozenset[str] = frozenset()) -> Iterator[FittedModel]:
-        """Yield the causes that the motion names, where they explain more, then with each further one that lowers the error.
-
-        Of the effects that the motion has judged only those are tried that it names beside the model.
-        """
-        if self.named is not None and self._is_worth(self.named, model):
-            model = self.named
-            yield model
+        """Yield a model with each further effect that lowers its error enough."""
+        # Of the effects that the motion has `judged` only those are tried that it names beside the model.
         enough = np.inf if self.proposal is not None else VERDICT.at_floor
         for _ in range(SEARCH.most_unnamed):
             if self.is_settled(model):
