@@ -28,9 +28,9 @@ def basis(
         rig=AXIS,
         open_factor=factor,
     )
-    judged = SimpleNamespace(verdict=verdict, reason="the reason", model=None)
+    judged = SimpleNamespace(verdict=verdict, reason="the reason", model=SimpleNamespace(effects=()))
     found = {
-        "context": SimpleNamespace(along_motion=None),
+        "context": SimpleNamespace(along_motion=None, scales={}),
         "windowing": SimpleNamespace(bandwidth=None, cycles=None),
         "reidentified": None,
         "judgement": judged,
@@ -52,7 +52,7 @@ def growth(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
 
 def test_where_nothing_is_odd_no_rule_tells_anything() -> None:
     plain = basis()
-    assert [rule(plain) for rule in (*notes.ON_THE_COMPARISON, *notes.ON_WHAT_STAYS_OPEN)] == [None] * 7
+    assert [rule(plain) for rule in (*notes.ON_THE_COMPARISON, *notes.ON_WHAT_STAYS_OPEN)] == [None] * 8
     expected = ("of the campaign", "of a record", "of the quality", "the reason", "a doubt")
     assert notes.verdict_notes(plain) == expected
 

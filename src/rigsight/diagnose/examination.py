@@ -23,7 +23,7 @@ from rigsight.diagnose.search.horizon import restores, windowing_of
 from rigsight.diagnose.search.one_more_effect import as_along_motion
 from rigsight.diagnose.search.single_effects import contenders, fit_candidate
 from rigsight.diagnose.search.worth_fitting import SuspectedPlace
-from rigsight.diagnose.verdict.families import keys_of, probable_part
+from rigsight.diagnose.verdict.families import keys_of, probable_part, with_shown_families
 from rigsight.diagnose.verdict.judgement import (
     Judgement,
     by_motion,
@@ -185,11 +185,15 @@ def _ranked(
     models: AllModels, allowed: float, rng: np.random.Generator
 ) -> tuple[Ranking, tuple[FittedModel, ...]]:
     """Return the ranking of all models with effects, and those that do not compete because other laws fit equally well."""
-    context, reidentified, singles = models.alone.context, models.alone.reidentified, models.alone.singles
+    context, reidentified = models.alone.context, models.alone.reidentified
+    singles, found = (
+        [with_shown_families(m, context.scales) for m in own]
+        for own in (models.alone.singles, models.several)
+    )
     # Families that the motion names were judged beside each other, on stretches to which they were not fitted.
     named = models.alone.named
-    by_motion = [m for m in models.several if named.issuperset(keys_of(context.rig, m.effects))]
-    others = [model for model in models.several if model not in by_motion]
+    by_motion = [m for m in found if named.issuperset(keys_of(context.rig, m.effects))]
+    others = [model for model in found if model not in by_motion]
     others, imitations = split_distinguishable(others, singles, allowed, models.checks.is_adequate)
     several = [*by_motion, *others]
     best_single = min(contenders(singles), key=lambda model: model.error_over_noise, default=reidentified)

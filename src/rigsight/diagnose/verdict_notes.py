@@ -13,8 +13,9 @@ import numpy as np
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.examination import Examination
-from rigsight.diagnose.policy import VERDICT
+from rigsight.diagnose.policy import FAMILIES, VERDICT
 from rigsight.diagnose.search.horizon import growth_of_disturbances
+from rigsight.diagnose.verdict.families import yielding_part
 from rigsight.identify.closed_loop import closed_loop_notes
 
 _REFERENCE_USED = (
@@ -143,6 +144,19 @@ def clocks_note(basis: Basis) -> str | None:
     )
 
 
+def yielding_note(basis: Basis) -> str | None:
+    """Tell why a hysteresis counts as dry friction."""
+    model, scales = basis.found.judgement.model, basis.found.context.scales
+    for effect in model.effects:
+        part = yielding_part(model, effect, scales)
+        if part is not None and part < FAMILIES.yields_at_once:
+            return (
+                f"{effect.name} yields over {part:.2g} of the motion, less than a tenth: it counts as dry friction, which gives "
+                f"way elastically before it slides."
+            )
+    return None
+
+
 ON_THE_COMPARISON: tuple[Rule, ...] = (
     open_factor_note,
     moving_at_rest_note,
@@ -151,5 +165,5 @@ ON_THE_COMPARISON: tuple[Rule, ...] = (
     sensitive_motion_note,
 )
 """How models were compared; read before the reason of the verdict."""
-ON_WHAT_STAYS_OPEN: tuple[Rule, ...] = (imitations_note, clocks_note)
+ON_WHAT_STAYS_OPEN: tuple[Rule, ...] = (imitations_note, yielding_note, clocks_note)
 """Read after the reason of the verdict and the doubts about parameters."""

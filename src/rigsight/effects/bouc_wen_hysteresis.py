@@ -118,6 +118,7 @@ BOUC_WEN_HYSTERESIS = Effect(
     ),
     energy=Energy.DISSIPATIVE,
     post_yield_stiffness_ratio="a",
+    yields_over=(beta + gamma) ** (-1 / n),
     signature=Signature(gain_trend=GainTrend.RISES),
     spring=a * spring_torque + (1 - a) * k * z,
     states=(

@@ -12,6 +12,8 @@ from rigsight.diagnose.verdict.families import (
     families_at_places,
     probable_part,
     shares_of_gap,
+    with_shown_families,
+    yielding_part,
 )
 from rigsight.effects import CATALOGUE, Family, effect_named
 from rigsight.inverse import Proposal, ProposedCause
@@ -142,3 +144,29 @@ def test_two_families_that_add_what_laws_err_are_not_named_although_no_set_with_
     spring = scored(names[:1], error_over_noise=8.0, residuals=left)
     reidentified = scored((), error_over_noise=20.1)
     assert probable_part(AXIS, reidentified, all_of_them, [all_of_them, pair, spring]) is pair
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "part"),
+    [
+        ("iwan_hysteresis", {"x_s": 0.02, "a": 0.5, "q": 0.0}, 0.01),
+        ("iwan_hysteresis", {"x_s": 0.6, "a": 0.0, "q": 0.0}, 0.3),
+        ("bouc_wen_hysteresis", {"beta": 60.0, "gamma": 40.0, "n": 1.0, "a": 0.1}, 0.005),
+        ("bouc_wen_hysteresis", {"beta": 6.0, "gamma": 3.0, "n": 2.0, "a": 0.1}, 1.0 / 6.0),
+        # It never yields, and the last one stiffens.
+        ("bouc_wen_hysteresis", {"beta": 4.0, "gamma": -4.0, "n": 1.0, "a": 0.1}, None),
+        ("bouc_wen_hysteresis", {"beta": 3.0, "gamma": -4.0, "n": 1.5, "a": 0.1}, None),
+        ("coulomb_friction", {"T_c": 0.1}, None),
+    ],
+)
+def test_a_hysteresis_that_yields_at_once_is_dry_friction(
+    scored, name: str, values: dict[str, float], part: float | None
+) -> None:
+    model = scored((name,), residuals=GAP)
+    model = replace(model, fit=replace(model.fit, values=values))
+    (effect,) = model.effects
+    scales = {"x": 2.0}
+    assert yielding_part(model, effect, scales) == (None if part is None else pytest.approx(part))
+    (shown,) = with_shown_families(model, scales).effects
+    at_once = part is not None and part < FAMILIES.yields_at_once
+    assert shown == (replace(effect, family=Family.DRY_FRICTION) if at_once else effect)

@@ -133,6 +133,7 @@ def test_every_field_is_checked(declared):
         (changed_parameter(dimension="force angle^-1"), "unknown quantity angle"),
         ({**changed_parameter(name="v"), "torque": v * x}, "has the name of a signal"),
         ({"special_cases": {"n": 1.0}}, "special_cases names n"),
+        ({"yields_over": sp.Symbol("x_y", real=True)}, "yields_over names x_y"),
         ({"ordered": (("c", "d"),)}, "ordered names d, which is not a parameter"),
         (
             {

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -17,10 +17,11 @@ import numpy as np
 from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.noise.block_means import squared_errors
 from rigsight.diagnose.policy import FAMILIES, SEARCH
-from rigsight.effects import Effect, Family
+from rigsight.effects import Effect, Family, placed_dimension
 from rigsight.inverse import Proposal
 from rigsight.records.record import Floats
 from rigsight.rigs import Rig
+from rigsight.units import characteristic_value
 
 Key = tuple[Family, str]
 """A family and the place at which it acts."""
@@ -137,6 +138,34 @@ def families_at_places(
         forms = _forms(rig, key, [usable[i] for i in members])
         found.append(FamilyAtPlace(*key, probability, share, (low, high), forms, along))
     return tuple(sorted(found, key=lambda own: (-own.share, -own.probability)))
+
+
+def with_shown_families(model: FittedModel, scales: Mapping[str, float]) -> FittedModel:
+    """Return a model in which a hysteresis that yields at once counts as dry friction, whose limiting case it is."""
+
+    def shown(effect: Effect) -> Effect:
+        part = yielding_part(model, effect, scales)
+        at_once = part is not None and part < FAMILIES.yields_at_once
+        return replace(effect, family=Family.DRY_FRICTION) if at_once else effect
+
+    return replace(model, effects=tuple(map(shown, model.effects)))
+
+
+def yielding_part(model: FittedModel, effect: Effect, scales: Mapping[str, float]) -> float | None:
+    """Return the deflection over which a hysteresis yields as a share of the motion; None if it does not yield."""
+    if effect.yields_over is None:
+        return None
+    structure, values = model.fit.structure, model.fit.all_values
+    own = {
+        symbol: values[structure.parameter_name(effect, symbol.name)]
+        for symbol in effect.yields_over.free_symbols
+    }
+    over = effect.yields_over.subs(own)
+    return (
+        float(over) / characteristic_value(placed_dimension(effect, "x"), scales)
+        if over.is_positive
+        else None
+    )
 
 
 def shares_of_force(found: Sequence[FamilyAtPlace], proposal: Proposal) -> Shares:
