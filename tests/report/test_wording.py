@@ -22,7 +22,7 @@ from rigsight.report.wording import (
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("two effects", "caused by Coulomb friction and cubic stiffness in the yaw dynamics; adding them closes"),
+        ("two effects", "may be caused by Coulomb friction and cubic stiffness in the yaw dynamics (probability 6 %"),
         ("own effect", "caused by my gear"),
         ("parameters", "caused by wrong parameters: refitting the same equations closes over 99.9 %"),
         ("none", "no gap to explain: the given simulation leaves 1.02 × the noise floor"),
@@ -73,10 +73,13 @@ def test_a_cause_that_the_motion_names_is_not_said_to_close_the_gap(
         remainder=Remainder(0.94, ("x",), "change of x", 0.001),
     )
     sentence = verdict_sentence(found)
-    assert "along the measured motion is mainly that of Coulomb friction" in sentence
-    assert "explains 79 % of the square of that force" in sentence
+    assert "along the measured motion is mainly explained by Coulomb friction" in sentence
+    assert ": 79 % of the square of that force." in sentence
     assert "closes none of the gap that refitting leaves; with it 12 × the noise floor remains" in sentence
     assert remainder_sentence(found) == ""
+    unsure = verdict_sentence(replace(found, families=(replace(friction, probability=0.26),)))
+    assert "may be mainly explained by Coulomb friction" in unsure
+    assert "(probability 26 %, more than any other cause)" in unsure
 
 
 def test_no_gap_far_above_the_floor_says_that_the_floor_seems_too_low(

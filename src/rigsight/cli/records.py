@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 _NAME_WIDTH = 16
 """Of the columns of names, at least, where they are as long."""
+_MOST_ROWS = 16
+"""Of the table of effects: that of a rig with several joints would be longer than a screen, and the page has it."""
 
 
 @with_groups
@@ -323,20 +325,27 @@ def _check_summary(found: Check) -> Group:
     from rich.markup import escape
 
     from rigsight.report.check import check_headline, effect_names, forms, rivals
+    from rigsight.workflow.check import CHECK_PAGE
 
-    findings = [(r.severity, f"{r.sentence} {r.remedy}") for r in found.remarks if r.severity != "note"]
-    apart = []
+    findings = [(r.severity, f"{r.sentence} {r.remedy}") for r in found.remarks]
+    apart, groups = [], dict[str, list[str]]()
     for rival in rivals(found.matrix):
         words = [rival.visible] if rival.visible else []
         words += [f"{by}: {names}" for by, names in rival.others]
         apart.append((rival.effect, rival.where, "; ".join(words)))
+        group = rival.visible or "is not told apart from all other families"
+        groups.setdefault(group, []).append(f"{rival.effect} at {rival.where}")
     alike = [f"Forms of {family} that are not told apart: {names}." for family, names in forms(found.matrix)]
+    heads = ("Effect", "Where", "Not told apart from")
+    effects = [table(heads, apart)] if apart else ["All families of effects can be told apart."]
+    if len(apart) > _MOST_ROWS:
+        effects = [f"What {group}: {', '.join(names)}." for group, names in groups.items()]
+        effects.append(f"Which effects and forms are not told apart from which others: see {CHECK_PAGE}.")
+        alike = []
     if found.matrix.hidden:
         alike.append(
             f"These records cannot show, at any size: {', '.join(effect_names(found.matrix.hidden))}."
         )
-    heads = ("Effect", "Where", "Not told apart from")
-    effects = [table(heads, apart)] if apart else ["All families of effects can be told apart."]
     return Group(
         check_headline(found),
         *([table(("", "Finding"), findings)] if findings else []),

@@ -10,7 +10,7 @@ This is its order. The numbers are those of the sections in docs/verdict.md, whi
 5. `fit_candidates` fits every effect alone, `lowered_by_extensions` the equations again from the best of them.
 6. `is_predictable` asks whether whole records can decide; else `fitted_in_windows`.
 7. `several_effects` adds effects where one does not explain the records, drops and exchanges them.
-8. `rank` compares all models that stand (`stands`, `is_beyond_records`, `beyond_disturbance`).
+8. `rank` compares all models that can be the cause (`can_be_cause`, `beyond_disturbance`).
 9. `judge` names the verdict, `by_motion` the cause where simulations do not decide; `adequacy` tests what the model leaves.
 10. `trained` gives probabilities of models, `families_at_places` those of families.
 11. `localize`, `with_own_errors` and `advise`: where, how sure, what next. `verdict_notes` says what else is to be known.

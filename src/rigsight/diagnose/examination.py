@@ -21,6 +21,7 @@ from rigsight.diagnose.search.evidence_for_more import beyond_disturbance, split
 from rigsight.diagnose.search.fitted_models import AllModels, single_models, with_several_effects
 from rigsight.diagnose.search.horizon import restores, windowing_of
 from rigsight.diagnose.search.one_more_effect import as_along_motion
+from rigsight.diagnose.search.possible_cause import can_be_cause
 from rigsight.diagnose.search.single_effects import contenders, fit_candidate
 from rigsight.diagnose.search.worth_fitting import SuspectedPlace
 from rigsight.diagnose.verdict.families import keys_of, probable_part, with_shown_families
@@ -34,13 +35,7 @@ from rigsight.diagnose.verdict.judgement import (
     most_remainder,
     with_unseen,
 )
-from rigsight.diagnose.verdict.plausibility import (
-    doubts,
-    is_beyond_records,
-    is_undetermined,
-    plausible_first,
-    stands,
-)
+from rigsight.diagnose.verdict.plausibility import doubts, plausible_first
 from rigsight.diagnose.verdict.ranking import Ranking, rank, with_last
 from rigsight.effects import Effect
 from rigsight.identify import FitMemory, IdleThreads
@@ -190,25 +185,23 @@ def _ranked(
         [with_shown_families(m, context.scales) for m in own]
         for own in (models.alone.singles, models.several)
     )
+    can_be = partial(can_be_cause, context, reidentified=reidentified, models=[*singles, *found])
+    possible = [model for model in singles if can_be(model)]
     # Families that the motion names were judged beside each other, on stretches to which they were not fitted.
     named = models.alone.named
     by_motion = [m for m in found if named.issuperset(keys_of(context.rig, m.effects))]
     others = [model for model in found if model not in by_motion]
-    others, imitations = split_distinguishable(others, singles, allowed, models.checks.is_adequate)
+    others, imitations = split_distinguishable(others, possible, allowed, models.checks.is_adequate)
     several = [*by_motion, *others]
-    best_single = min(contenders(singles), key=lambda model: model.error_over_noise, default=reidentified)
+    best_single = min(contenders(possible), key=lambda model: model.error_over_noise, default=reidentified)
     evidence = Evidence(context, reidentified, best_single)
     if not models.are_in_windows:
-        stand = beyond_disturbance(evidence, singles, models.forms.with_own_evidence(singles, others))
+        stand = beyond_disturbance(evidence, possible, models.forms.with_own_evidence(singles, others))
         several = with_parts([*by_motion, *stand], several)
-    fitted = [*singles, *several]
     candidates: list[FittedModel] = []
     not_shown: list[FittedModel] = []
-    duration = max(record.duration for record in context.records)
-    for model in fitted:
-        is_shown = stands(model, reidentified, fitted) and not is_undetermined(model, reidentified)
-        is_shown &= not is_beyond_records(model, context.scales, duration)
-        (candidates if is_shown else not_shown).append(model)
+    for model in (*singles, *several):
+        (candidates if can_be(model) else not_shown).append(model)
     likeliest = min(contenders(candidates), key=evidence.criterion, default=None)
     # A likelihood treats the residual as noise: it is used only if the residual of the most likely model is noise.
     counts = likeliest is not None and models.checks.is_adequate(likeliest)

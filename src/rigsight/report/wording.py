@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rigsight.diagnose.location.gap_parts import GapPart
 from rigsight.diagnose.location.trace import Stage
-from rigsight.diagnose.policy import VERDICT
+from rigsight.diagnose.policy import FAMILIES, VERDICT
 from rigsight.diagnose.result import Candidate, Diagnosis, OutputGap
 from rigsight.effects import AT, kind_of
 from rigsight.report.labels import (
@@ -150,25 +150,26 @@ def _first(diagnosis: Diagnosis) -> str:
 
 def _effect_sentence(diagnosis: Diagnosis) -> str:
     cause = _cause_label(diagnosis)
-    sure = "most likely caused" if diagnosis.ambiguous_with else "caused"
     it = "them" if len(diagnosis.effects) > 1 else "it"
     refitted, after = error_over_noise(diagnosis, "reidentified"), error_over_noise(diagnosis, "after")
     # What wrong numbers cause is closed by refitting them, and is no share of the effect.
     of = " that refitting leaves" if is_given(diagnosis) else ""
-    if _is_named_by_motion(diagnosis):
-        sure = "mainly, most likely," if diagnosis.ambiguous_with else "mainly"
+    by_motion = _is_named_by_motion(diagnosis)
+    mainly = "mainly " if by_motion or _leaves_more(diagnosis) else ""
+    if diagnosis.probability < FAMILIES.probable:
+        # Nobody would bet on it.
+        gap, force = (f"may be {mainly}{own} by " for own in ("caused", "explained"))
+        cause += f" (probability {percent(diagnosis.probability)}, more than any other cause)"
+    else:
+        likely = "most likely " if diagnosis.ambiguous_with else ""
+        gap, force = (f"is {likely}{mainly}{own} by " for own in ("caused", "explained"))
+    if by_motion:
         share = percent(max(own.share for own in diagnosis.families))
         return (
-            f"The force that the equations lack along the measured motion is {sure} that of {cause}: "
-            f"it explains {share} of the square of that force. Simulated, adding {it} "
-            f"{_shrinks(refitted, after, of)}; with {it} {times_floor(after)} remains."
+            f"The force that the equations lack along the measured motion {force}{cause}: {share} of the square of that force. "
+            f"Simulated, adding {it} {_shrinks(refitted, after, of)}; with {it} {times_floor(after)} remains."
         )
-    if _leaves_more(diagnosis):
-        sure = "mainly caused, most likely," if diagnosis.ambiguous_with else "mainly caused"
-    return (
-        f"The gap is {sure} by {cause}; adding {it} {_shrinks(refitted, after, of)}, "
-        f"down to {times_floor(after)}."
-    )
+    return f"The gap {gap}{cause}; adding {it} {_shrinks(refitted, after, of)}, down to {times_floor(after)}."
 
 
 def _cause_label(diagnosis: Diagnosis) -> str:

@@ -53,3 +53,11 @@ def test_a_rig_that_can_rest_anywhere_may_lie_anywhere(two_masses: Rig) -> None:
 def test_runs_forward_and_backward_are_no_other_zero(two_masses: Rig) -> None:
     assert reported(two_masses, runs(3.0, push=1.8)) == []
     assert len(reported(two_masses, runs(3.0))) == 1
+
+
+def test_records_that_go_opposite_ways_from_one_place_have_the_same_zero(two_masses: Rig) -> None:
+    first, again = runs(0.0)
+    ways = [r.with_signals(second_place=way * 9.0 * T) for r, way in ((first, 1.0), (again, -1.0))]
+    assert reported(two_masses, ways) == []
+    shifted = [ways[0], ways[1].with_signals(second_place=ways[1]["second_place"] - 90.0)]
+    assert len(reported(two_masses, shifted)) == 1

@@ -13,9 +13,9 @@ from rigsight.diagnose.search.nested_models import (
     lowered_by_extensions,
     ordered_by_inclusion,
 )
+from rigsight.diagnose.search.possible_cause import has_size_of_zero
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.diagnose.search.starts import start_values
-from rigsight.diagnose.verdict.plausibility import has_size_of_zero
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.identify import characteristic_scales, off_bounds
 from rigsight.records import Record

@@ -8,13 +8,7 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose.fit_context import FittedModel
-from rigsight.diagnose.verdict.plausibility import (
-    doubts,
-    has_size_of_zero,
-    is_beyond_records,
-    is_undetermined,
-    plausible_first,
-)
+from rigsight.diagnose.verdict.plausibility import doubts, plausible_first
 from rigsight.diagnose.verdict.ranking import Grounds, Ranking
 
 PLACES = {"coulomb_friction": "dynamics", "stribeck_friction": "dynamics", "actuator_lag": "actuator"}
@@ -52,22 +46,6 @@ def ranked(*models: FittedModel) -> Ranking:
         (),
         tuple(Grounds(share, share, None) for share in shares),
     )
-
-
-def test_an_effect_none_of_whose_numbers_the_records_determine_is_undetermined(models) -> None:
-    reidentified, coulomb, stribeck = models
-    assert not any(is_undetermined(model, reidentified) for model in (reidentified, coulomb, stribeck))
-    errors = {**coulomb.fit.standard_errors, "T_c": np.inf}
-    assert is_undetermined(replace(coulomb, fit=replace(coulomb.fit, standard_errors=errors)), reidentified)
-
-
-def test_an_effect_that_opens_a_common_factor_is_undetermined_unless_it_is_open_without_it(models) -> None:
-    reidentified, coulomb, _ = models
-    beside = replace(coulomb.fit, standard_errors=dict.fromkeys(coulomb.fit.free, np.inf))
-    opened = replace(coulomb, fit=beside)
-    assert is_undetermined(opened, reidentified)
-    without = replace(reidentified.fit, standard_errors=dict.fromkeys(reidentified.fit.free, np.inf))
-    assert not is_undetermined(opened, replace(reidentified, fit=without))
 
 
 def test_plain_numbers_leave_no_doubt(models) -> None:
@@ -110,50 +88,3 @@ def test_a_model_that_is_far_worse_or_elsewhere_does_not(models, scored) -> None
         scored(("actuator_lag",), residuals=np.full(9, 5.1)), coulomb.fit.values, coulomb.fit.standard_errors
     )
     assert plausible_first(ranked(stribeck, lag, worse), reidentified, PLACES).order[0] is stribeck
-
-
-@pytest.mark.parametrize(
-    ("effect", "values", "beyond"),
-    [
-        # Less than one and a half periods of a ripple lie in the motion.
-        ("torque_ripple", {"T_sin": 1.0, "T_cos": 0.1, "kappa": 3.0}, True),
-        ("torque_ripple", {"T_sin": 1.0, "T_cos": 0.1, "kappa": 6.0}, False),
-        ("maxwell_branch", {"k_m": 1.0, "tau_m": 30.0}, True),
-        ("maxwell_branch", {"k_m": 1.0, "tau_m": 3.0}, False),
-        ("flexible_mode", {"m_a": 78000.0, "w_a": 0.2, "zeta_a": 0.1}, True),
-        ("periodic_disturbance", {"T_p": 1.0, "w_p": 0.6}, True),
-        ("periodic_disturbance", {"T_p": 1.0, "w_p": 1.5}, False),
-        # A mode starts from equilibrium, so that two of its periods say as much as they are.
-        ("flexible_mode", {"m_a": 0.2, "w_a": 0.6, "zeta_a": 0.1}, False),
-        ("presliding_friction", {"T_c": 1.0, "x_p": 20900.0}, True),
-        ("coulomb_friction", {"T_c": 1.0}, False),
-    ],
-)
-def test_what_is_slower_or_longer_than_the_records_is_no_candidate(
-    scored, effect: str, values: dict[str, float], beyond: bool
-) -> None:
-    model = with_numbers(scored((effect,)), values, dict.fromkeys(values, 0.1))
-    assert is_beyond_records(model, {"x": 1.0, "time": 1.0}, 20.0) is beyond
-
-
-@pytest.mark.parametrize(
-    ("effect", "held_out", "has_none"),
-    [
-        ("coulomb_friction", 0.6, False),
-        ("coulomb_friction", 0.8, True),
-        ("maxwell_branch", 0.6, True),
-    ],
-)
-def test_errors_of_a_size_do_not_count_against_what_held_out_records_show(
-    scored, effect: str, held_out: float, has_none: bool
-) -> None:
-    """The larger part of the square is removed at 0.71; a branch has a state, which may start anywhere."""
-    without = with_numbers(scored((), error_over_noise=20.0), {"m": 1.0}, {"m": 0.1})
-    size = {"coulomb_friction": "T_c", "maxwell_branch": "k_m"}[effect]
-    model = with_numbers(
-        scored((effect,), residuals=np.full(9, held_out * 20.0)), {"m": 1.0, size: 1.0}, {"m": 0.1, size: 1.0}
-    )
-    fit = replace(model.fit, covariance=np.diag([0.01, 1.0]), cost=1.0, n_samples=100)
-    model = replace(model, fit=fit)
-    without = replace(without, fit=replace(without.fit, cost=400.0, n_samples=100))
-    assert has_size_of_zero(model, [without]) is has_none

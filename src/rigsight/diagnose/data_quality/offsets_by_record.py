@@ -72,7 +72,7 @@ def levels_apart(context: FitContext, records: Sequence[Record]) -> list[Finding
         moves, lowest, highest = _apart(holding, signal.name)
         pair = [record for record in holding if record.name in (lowest, highest)]
         driven = max((_apart(pair, one.name)[0] for one in rig.inputs), default=0.0)
-        if moves > max(1.0, NOTES.per_drive * driven):
+        if moves > max(1.0, NOTES.per_drive * driven) and _begin_apart(pair, signal.name):
             found.append(
                 Finding(
                     "offset",
@@ -104,6 +104,12 @@ def _apart(records: Sequence[Record], name: str) -> tuple[float, str, str]:
     lowest, highest = (choose(levels, key=levels.__getitem__) for choose in (min, max))
     apart, motion = levels[highest] - levels[lowest], max(float(np.ptp(record[name])) for record in records)
     return apart / motion if motion > 0.0 else float("inf") if apart > 0.0 else 0.0, lowest, highest
+
+
+def _begin_apart(pair: Sequence[Record], name: str) -> bool:
+    """Return True if the larger part of the difference of two means is there at the first sample: a sensor was zeroed."""
+    one, other = (record[name] for record in pair)
+    return bool(abs(one[0] - other[0]) >= VERDICT.larger_part * abs(np.mean(one) - np.mean(other)))
 
 
 def means_of(context: FitContext, model: FittedModel) -> list[DifferingMeans]:

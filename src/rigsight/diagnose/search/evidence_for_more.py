@@ -12,6 +12,7 @@ imitated a single effect whose own fit had stopped too early (seeds 3 to 8, `exp
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -19,7 +20,7 @@ import sympy as sp
 
 from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.noise.evidence import Evidence
-from rigsight.diagnose.policy import VERDICT
+from rigsight.diagnose.policy import FAMILIES, SEARCH, VERDICT
 from rigsight.diagnose.pushes.alternatives import law_columns
 from rigsight.diagnose.pushes.responses import Responses, orthonormal
 from rigsight.effects import Effect, Place
@@ -182,6 +183,7 @@ def beyond_disturbance(
     """Return the models that explain more than any single effect with a disturbance, and increase no part of the error."""
     # A disturbance excites the resonances of a rig, and a second effect with its own motion can follow that in each record. If
     # the form of the first is slightly wrong, a second that excites the rig may compensate a slow error but cause a fast one.
+    # Effects without states follow no disturbance in records that they were not fitted to.
     alone = [model for model in singles if model.residuals]
     if not larger or not alone:
         return list(larger)
@@ -191,10 +193,28 @@ def beyond_disturbance(
         parts = [part for part in (*alone, *larger) if part.residuals and set(part.names) < set(model.names)]
         return evidence.criterion(model) < least and all(evidence.gain(model, part) > 0.0 for part in parts)
 
-    return [model for model in larger if not model.residuals or stands(model)]
+    return [
+        model
+        for model in larger
+        if not model.residuals or not any(effect.states for effect in model.effects) or stands(model)
+    ]
 
 
 def with_parts(chosen: Sequence[FittedModel], larger: Sequence[FittedModel]) -> list[FittedModel]:
     """Return the chosen models and the others of several effects that are parts of them: they tell the share of each effect."""
     names = [set(model.names) for model in chosen]
     return [model for model in larger if any(set(model.names) <= own for own in names)]
+
+
+def evidence_of_share(explained: float, without: float, per_share: float) -> float:
+    """Return the evidence [nats] of a family, from the shares that are explained with it and without it."""
+    # What a law errs remains in both.
+    of_law = SEARCH.law_error**2
+    with_it, without_it = (1.0 - min(max(own, 0.0), 1.0) + of_law for own in (explained, without))
+    return per_share * math.log(without_it / with_it)
+
+
+def chance_of_further_cause(together: float, without: float) -> float:
+    """Return how probable a family is as a further cause, from the shares that a model explains with it and without it."""
+    weight = math.exp(evidence_of_share(together, without, FAMILIES.per_simulation))
+    return weight / ((1.0 + FAMILIES.failing) * weight + FAMILIES.other_causes)

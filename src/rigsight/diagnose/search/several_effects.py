@@ -22,10 +22,12 @@ import numpy as np
 
 from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.noise.adequacy import Checks
-from rigsight.diagnose.policy import SEARCH, VERDICT
+from rigsight.diagnose.policy import FAMILIES, SEARCH, VERDICT
+from rigsight.diagnose.search.evidence_for_more import chance_of_further_cause
 from rigsight.diagnose.search.first_look import FirstLook
 from rigsight.diagnose.search.nested_models import in_lowest_basins, without_repeated_equations
 from rigsight.diagnose.search.one_more_effect import each_once, part_of, reduced, with_causes, with_one_more
+from rigsight.diagnose.search.possible_cause import can_be_cause, leading
 from rigsight.diagnose.search.single_effects import finished, followed, refine
 from rigsight.diagnose.search.together import Together
 from rigsight.diagnose.search.worth_fitting import SingleModels
@@ -46,12 +48,14 @@ class SeveralEffects:
 
     context: FitContext  # records, scales and noise
     singles: Sequence[FittedModel]  # every effect alone that could be simulated, best first
+    best: FittedModel  # the best of those that can be the cause
     # The families that the motion names; None where it does not show the missing force.
     proposal: Proposal | None
     named: FittedModel | None  # all causes that it names, fitted together
     effects: Sequence[Effect]  # candidates for a further cause
     together: Together  # sets of the effects that may be the main cause
     ask: Ask  # what the motion says of the force that a fitted model leaves
+    reidentified: FittedModel  # the equations without an effect
     enough: float  # error up to which a simulation follows the motion, in units of the noise floor
     # Whether a model leaves nothing to explain, or no more than a law errs.
     is_settled: Callable[[FittedModel], bool]
@@ -69,7 +73,8 @@ class SeveralEffects:
                 return []
             pairs = zip(model.effects, parts, strict=True)
             others = [other for effect, part in pairs for other in self.exchanged(model, effect, part)]
-            models = self._compared(finished(self.context, model), [*others, *models, *larger[:-1], *parts])
+            rivals = [*self._possible(others), *models, *larger[:-1], *parts]
+            models = self._compared(finished(self.context, model), rivals)
         several = [model for model in models if len(model.effects) > 1]
         return larger_first(without_repeated_equations(self.context, several), self.singles)
 
@@ -81,7 +86,7 @@ class SeveralEffects:
     def _pool(self) -> list[FittedModel]:
         """Return the causes that the motion names, with further ones, and sets of those that it does not judge."""
         judged = frozenset[str]() if self.proposal is None else self.proposal.judged
-        best = self.singles[0]
+        best = self.best
         if self.named is not None and self._is_worth(self.named, best):
             models = [self.named, *self._grown(self.named, judged)]
         else:
@@ -94,12 +99,18 @@ class SeveralEffects:
             for size in (2, 3):
                 sets = self.together.fitted(size, self._least_share)
                 models += [one for one in sets if self._is_worth(one, best)]
-        return models
+        return self._possible(models)
+
+    def _possible(self, models: Sequence[FittedModel]) -> list[FittedModel]:
+        """Return the models that can be the cause: what follows each record by its own states would lead."""
+        return [
+            m for m in models if can_be_cause(self.context, m, self.reidentified, [*self.singles, *models])
+        ]
 
     def _named_first(self) -> list[FittedModel]:
         """Return the best single of the first family that the motion names, if a single of another one is the best."""
         taken = () if self.proposal is None else self.proposal.taken[:1]
-        keys = {(cause.family, cause.where) for cause in taken} - self._keys(self.singles[0])
+        keys = {(cause.family, cause.where) for cause in taken} - self._keys(self.best)
         return [single for single in self.singles if self._keys(single) <= keys and single.effects][:1]
 
     def _reduced(self, model: FittedModel) -> tuple[list[FittedModel], list[FittedModel]]:
@@ -135,7 +146,7 @@ class SeveralEffects:
             larger_ones = with_one_more(self.context, model, further, self.singles, self._least_share, enough)
             if beside is not None and (new := self._new(beside, model)):
                 larger_ones.append(with_causes(self.context, model, new, beside))
-            best = min(larger_ones, key=_error, default=model)
+            best = min(self._possible(larger_ones), key=_error, default=model)
             if not self._is_worth(best, model):
                 break
             model = best
@@ -148,13 +159,17 @@ class SeveralEffects:
 
     def _is_worth(self, larger: FittedModel, model: FittedModel) -> bool:
         """Return True if one more effect lowers the held-out error of a model enough."""
-        return larger.error_over_noise <= self._allowed(model.error_over_noise)
-
-    def _allowed(self, remainder: float) -> float:
-        """Return the error that a model with one more effect may leave: less where the motion does not show its force."""
+        # More is asked where the motion does not show its force: it closes the larger part of the error, or is a probable cause
+        # where no law is exact.
+        error, remainder = larger.error_over_noise, model.error_over_noise
         if self.proposal is not None:
-            return remainder / VERDICT.worthwhile
-        return remainder - VERDICT.larger_part * (remainder - 1.0)
+            return error <= remainder / VERDICT.worthwhile
+        if error <= remainder - VERDICT.larger_part * (remainder - 1.0):
+            return True
+        together, without = (
+            1.0 - (own / self.reidentified.error_over_noise) ** 2 for own in (error, remainder)
+        )
+        return chance_of_further_cause(together, without) >= FAMILIES.probable
 
     def _key(self, effect: Effect) -> Key:
         return effect.family, self.context.rig.where(effect)
@@ -223,12 +238,12 @@ def several_effects(models: SingleModels, ask: Ask, checks: Checks, lower_bound:
     """Return models of several effects if a single effect does not explain everything."""
     # `ask` says what the motion shows of the force that a model leaves.
     context, reidentified, worth = models.context, models.reidentified, models.worth
-    usable = sorted(
-        (model for model in models.singles if model.residuals and np.isfinite(model.error_over_noise)),
-        key=_error,
-    )
-    if not usable:
+    best = leading(context, models.singles, reidentified)
+    if best is None:
         return []
+    usable = sorted(
+        (m for m in models.singles if m.residuals and np.isfinite(m.error_over_noise)), key=_error
+    )
     proposal = models.proposal if worth.is_shown else None
 
     def is_settled(model: FittedModel) -> bool:
@@ -242,17 +257,18 @@ def several_effects(models: SingleModels, ask: Ask, checks: Checks, lower_bound:
         )
         return error <= least or (error <= most and checks.is_adequate(model))
 
-    best = usable[0]
     if is_settled(best) or (not worth.is_shown and best.error_over_noise <= tied_at_the_floor(reidentified)):
         return []
     found = SeveralEffects(
         context,
         usable,
+        best,
         proposal,
         models.together,
         models.effects,
         Together(context, reidentified, worth.alone if worth.is_shown else models.effects),
         ask,
+        reidentified,
         larger_part_closed(reidentified),
         is_settled,
     ).found()

@@ -16,7 +16,8 @@ import numpy as np
 
 from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.noise.block_means import squared_errors
-from rigsight.diagnose.policy import FAMILIES, SEARCH
+from rigsight.diagnose.policy import FAMILIES
+from rigsight.diagnose.search.evidence_for_more import chance_of_further_cause, evidence_of_share
 from rigsight.effects import Effect, Family, placed_dimension
 from rigsight.inverse import Proposal
 from rigsight.records.record import Floats
@@ -118,7 +119,9 @@ def families_at_places(
         beyond = main.get(key, 0.0)
         if key in own_keys and len(own_keys) > 1:
             without = _best(frozenset(own_keys) - {key}, explained, of_sets)
-            beyond = max(beyond, _second_cause(_explained_by(diagnosed, models, explained), without))
+            beyond = max(
+                beyond, chance_of_further_cause(_explained_by(diagnosed, models, explained), without)
+            )
         # Where the motion decides, no law is exact: that one of the forms tried is the true one explains nothing.
         probability = beyond if by_motion else min(1.0, listed + outside * beyond)
         if key in own_keys and by_motion and key in causes:
@@ -221,7 +224,9 @@ def probable_part(
             if parts:
                 part = min(parts, key=lambda own: own.error_over_noise)
                 without = 1.0 - part.error_over_noise**2 / gap
-                chances.append((_second_cause(1.0 - model.error_over_noise**2 / gap, without), part))
+                chances.append(
+                    (chance_of_further_cause(1.0 - model.error_over_noise**2 / gap, without), part)
+                )
         least, smaller = min(chances, key=lambda own: own[0], default=(1.0, model))
         if least >= FAMILIES.probable:
             break
@@ -250,7 +255,7 @@ def _weighed(
     if proposal is not None:
         per_share = FAMILIES.per_motion * (1.0 - proposal.by_chance)
         alone = [own for own in proposal.alone if any((own.family, own.where) in key for key in counting)]
-        of_motion = {(own.family, own.where): _evidence(own.share, 0.0, per_share) for own in alone}
+        of_motion = {(own.family, own.where): evidence_of_share(own.share, 0.0, per_share) for own in alone}
         # What nothing tells from a larger gain is as probable by the motion as the best family: simulations decide.
         open_to_motion = {
             key
@@ -271,24 +276,10 @@ def _weighed(
             default=0.0,
         )
         weights[key] = max(share, FAMILIES.least_rank) ** counts * math.exp(
-            _evidence(simulated, 0.0, FAMILIES.per_simulation) + of_motion.get(key, 0.0)
+            evidence_of_share(simulated, 0.0, FAMILIES.per_simulation) + of_motion.get(key, 0.0)
         )
     whole = (1.0 + FAMILIES.failing) * math.fsum(weights.values()) + FAMILIES.other_causes
     return {key: weight / whole for key, weight in weights.items()}
-
-
-def _second_cause(together: float, without: float) -> float:
-    """Return how probable a family is as a further cause, from what a model explains with it and without it."""
-    weight = math.exp(_evidence(together, without, FAMILIES.per_simulation))
-    return weight / ((1.0 + FAMILIES.failing) * weight + FAMILIES.other_causes)
-
-
-def _evidence(explained: float, without: float, per_share: float) -> float:
-    """Return the evidence [nats] of a family, from the shares that are explained with it and without it."""
-    # What a law errs remains in both.
-    of_law = SEARCH.law_error**2
-    with_it, without_it = (1.0 - min(max(own, 0.0), 1.0) + of_law for own in (explained, without))
-    return per_share * math.log(without_it / with_it)
 
 
 def _explained_by(model: FittedModel, models: Sequence[FittedModel], explained: Floats) -> float:

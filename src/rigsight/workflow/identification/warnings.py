@@ -149,8 +149,9 @@ def beyond_identified_amplitudes(campaign: Campaign) -> list[str]:
             continue
         one = math.isclose(low, high, rel_tol=_TOLERANCE)
         span = f"{low:.3g} {unit}" if one else f"{low:.3g} to {high:.3g} {unit}"
+        than = "smaller" if size < low else "larger"
         reported.append(
-            f"Validation record '{record.name}' has an amplitude of {size:.3g} {unit}, outside the identified range ({span}): "
+            f"Validation record '{record.name}' has an amplitude of {size:.3g} {unit}, {than} than the fitted records ({span}): "
             "its score shows how well the model extrapolates, not how well it was identified."
         )
     return reported
