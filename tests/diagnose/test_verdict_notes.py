@@ -18,6 +18,12 @@ from rigsight.rigs import AXIS
 from rigsight.simulate import compose
 
 
+def fitted(*residuals: float, names: tuple[str, ...] = ()) -> Any:
+    """What rules read of a model: its residuals in the fitted records, nothing held out."""
+    left = tuple(np.full((3, 1), own) for own in residuals)
+    return SimpleNamespace(effects=(), names=names, fit=SimpleNamespace(residuals=left), residuals=())
+
+
 def basis(
     verdict: str = "effect", *, below_rest: float | None = None, factor: Any = None, **found: Any
 ) -> notes.Basis:
@@ -28,11 +34,13 @@ def basis(
         rig=AXIS,
         open_factor=factor,
     )
-    judged = SimpleNamespace(verdict=verdict, reason="the reason", model=SimpleNamespace(effects=()))
+    judged = SimpleNamespace(verdict=verdict, reason="the reason", model=fitted())
     found = {
-        "context": SimpleNamespace(along_motion=None, scales={}),
+        "context": SimpleNamespace(
+            along_motion=None, scales={}, estimation=(), scoring=(), floors=np.ones(1)
+        ),
         "windowing": SimpleNamespace(bandwidth=None, cycles=None),
-        "reidentified": None,
+        "reidentified": fitted(),
         "judgement": judged,
         "quality": SimpleNamespace(notes=("of the quality",)),
         "imitations": (),
@@ -52,7 +60,7 @@ def growth(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
 
 def test_where_nothing_is_odd_no_rule_tells_anything() -> None:
     plain = basis()
-    assert [rule(plain) for rule in (*notes.ON_THE_COMPARISON, *notes.ON_WHAT_STAYS_OPEN)] == [None] * 8
+    assert [rule(plain) for rule in (*notes.ON_THE_COMPARISON, *notes.ON_WHAT_STAYS_OPEN)] == [None] * 9
     expected = ("of the campaign", "of a record", "of the quality", "the reason", "a doubt")
     assert notes.verdict_notes(plain) == expected
 
@@ -128,6 +136,22 @@ def test_all_are_read_in_order_and_none_holds_a_brace(growth: SimpleNamespace) -
     before = ["of the campaign", "of a record", "It is open.", "A model's error", "The rig has"]
     after = ["of the quality", "the reason", "a doubt", "Together a and"]
     assert begun == [[*before, "The motion of", *after], [*before, "In free run", *after]]
+
+
+def test_a_record_that_an_effect_makes_worse_is_told() -> None:
+    records = tuple(SimpleNamespace(origin=name) for name in ("slow", "fast"))
+    context = SimpleNamespace(estimation=records, scoring=(), floors=np.ones(1))
+
+    def note(slow: float) -> str | None:
+        judged = SimpleNamespace(verdict="effect", model=fitted(slow, 1.0, names=("speed_limit",)))
+        return notes.worse_record_note(
+            basis(context=context, judgement=judged, reidentified=fitted(2.0, 9.0))
+        )
+
+    assert note(2.1) is None
+    reported = note(3.0)
+    assert reported is not None
+    assert reported.startswith("In record 'slow' the error with speed_limit is 1.5 times that without")
 
 
 def test_every_rule_is_called() -> None:

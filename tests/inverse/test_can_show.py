@@ -8,7 +8,7 @@ import pytest
 from rigsight.campaign import Campaign
 from rigsight.diagnose.fit_context import candidates_on
 from rigsight.effects import CATALOGUE, Family, effect_named, kind_of
-from rigsight.inverse import propose
+from rigsight.inverse import hidden_effects, propose
 from rigsight.records import Record
 from rigsight.rigs import AXIS, Rig
 from rigsight.rigs.reading.rig_file import rig_of_text
@@ -52,6 +52,18 @@ def test_a_force_over_an_unknown_position_and_a_difference_of_directions_in_one_
     asked = {*OF_POSITION, "directional_damping", "flexible_mode", "torque_ripple"}
     assert asked & set(map(kind_of, found.hidden)) == hidden
     assert found.taken[0].family == "dry_friction"
+
+
+def test_what_a_motion_cannot_show_does_not_depend_on_effects_that_are_modelled() -> None:
+    """Beside a bridge that coasts nothing is asked along the motion, and a wheel still turns freely."""
+    t = DT * np.arange(2000)
+    bridge = effect_named("coasting_bridge")
+    record = Record("run", DT, {"u": 0.3 * np.sin(3.0 * t)}, {}, hold="foh")
+    run = simulate(compose(SHOWS_SPEED, [bridge]), {**VALUES, "c_b": 0.1}, record)
+    campaign = Campaign("motor", SHOWS_SPEED, {}, {}, (run,), (bridge,))
+    offered = candidates_on(SHOWS_SPEED, CATALOGUE, campaign.modelled)
+    assert propose(campaign, {**VALUES, "c_b": 0.1}, offered) is None
+    assert set(map(kind_of, hidden_effects(campaign, VALUES, offered))) >= OF_POSITION
 
 
 def test_a_free_motion_that_is_read_later_is_another_one_of_the_same_equations() -> None:

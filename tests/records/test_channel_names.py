@@ -16,6 +16,8 @@ from rigsight.records.channel_names import closeness, split_unit
         ("pos_mm", "pos", "mm"),
         ("time_in_ms", "time", "ms"),
         ("speed_rad_s", "speed", "rad/s"),
+        ("speed_in_per_s", "speed", "in/s"),
+        ("turns_per_s", "turns_per_s", None),
         ("rate deg_per_s", "rate", "deg/s"),
         ("Winkel °", "Winkel", "°"),
         ("x", "x", None),

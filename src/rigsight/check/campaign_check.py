@@ -74,9 +74,10 @@ class Check:
     matrix: EffectMatrix
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Faults and warnings, each with what to do."""
-        return tuple(f"{r.sentence} {r.remedy}".strip() for r in self.remarks if r.severity != "note")
+    def at_once(self) -> tuple[str, ...]:
+        """Faults and warnings, each with what to do, and how each record was read: what is to be known before a fit."""
+        told = (r for r in self.remarks if r.severity != "note" or r.record is not None)
+        return tuple(f"{r.sentence} {r.remedy}".strip() for r in told)
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``check.json``."""

@@ -193,10 +193,10 @@ def _ranked(
     others = [model for model in found if model not in by_motion]
     others, imitations = split_distinguishable(others, possible, allowed, models.checks.is_adequate)
     several = [*by_motion, *others]
-    best_single = min(contenders(possible), key=lambda model: model.error_over_noise, default=reidentified)
-    evidence = Evidence(context, reidentified, best_single)
+    rivals = sorted(contenders(possible or singles), key=lambda model: model.error_over_noise)
+    evidence = Evidence(context, reidentified, next(iter(rivals), reidentified))
     if not models.are_in_windows:
-        stand = beyond_disturbance(evidence, possible, models.forms.with_own_evidence(singles, others))
+        stand = beyond_disturbance(evidence, rivals, singles, models.forms.with_own_evidence(singles, others))
         several = with_parts([*by_motion, *stand], several)
     candidates: list[FittedModel] = []
     not_shown: list[FittedModel] = []

@@ -17,6 +17,7 @@ from rigsight.diagnose.policy import FAMILIES, VERDICT
 from rigsight.diagnose.search.horizon import growth_of_disturbances
 from rigsight.diagnose.verdict.families import yielding_part
 from rigsight.identify.closed_loop import closed_loop_notes
+from rigsight.records.record import Floats
 
 _REFERENCE_USED = (
     "It is used as instrument when the frequency responses of two amplitudes are compared, if the input responds to it in both; "
@@ -157,6 +158,32 @@ def yielding_note(basis: Basis) -> str | None:
     return None
 
 
+def worse_record_note(basis: Basis) -> str | None:
+    """Tell which record the named effects make worse."""
+    found = basis.found
+    model, without, context = found.judgement.model, found.reidentified, found.context
+    if found.judgement.verdict != "effect":
+        return None
+    squares: dict[str, Floats] = {}
+    for records, left, before in (
+        (context.estimation, model.fit.residuals, without.fit.residuals),
+        (context.scoring, model.residuals, without.residuals),
+    ):
+        for record, *both in zip(records, left, before, strict=False):
+            own = np.array([np.nansum((residual / context.floors) ** 2) for residual in both])
+            squares[record.origin] = squares.get(record.origin, np.zeros(2)) + own
+    factors = {
+        name: float(np.sqrt(left / before)) for name, (left, before) in squares.items() if before > 0.0
+    }
+    worst = max(factors, key=lambda name: factors[name], default="")
+    if not worst or factors[worst] <= VERDICT.worthwhile:
+        return None
+    return (
+        f"In record '{worst}' the error with {', '.join(model.names)} is {factors[worst]:.2g} times that without: something else "
+        "is missing there, or the effect has another form."
+    )
+
+
 ON_THE_COMPARISON: tuple[Rule, ...] = (
     open_factor_note,
     moving_at_rest_note,
@@ -165,5 +192,5 @@ ON_THE_COMPARISON: tuple[Rule, ...] = (
     sensitive_motion_note,
 )
 """How models were compared; read before the reason of the verdict."""
-ON_WHAT_STAYS_OPEN: tuple[Rule, ...] = (imitations_note, yielding_note, clocks_note)
+ON_WHAT_STAYS_OPEN: tuple[Rule, ...] = (imitations_note, yielding_note, worse_record_note, clocks_note)
 """Read after the reason of the verdict and the doubts about parameters."""

@@ -29,6 +29,7 @@ from rigsight.inverse.proposal import ProposedCause as ProposedCause
 from rigsight.inverse.proposal import ProposedForm as ProposedForm
 from rigsight.inverse.proposal import ProposedStart as ProposedStart
 from rigsight.inverse.propose import along_motion as along_motion
+from rigsight.inverse.propose import hidden_effects as hidden_effects
 from rigsight.inverse.propose import numbers_along_motion as numbers_along_motion
 from rigsight.inverse.propose import propose as propose
 from rigsight.inverse.propose import selection_of as selection_of

@@ -87,6 +87,16 @@ def propose(
     return replace(found, hidden=hidden, noise=by_noise, forces=missing_forces(fit, values, covariance))
 
 
+def hidden_effects(
+    campaign: Campaign, known: Mapping[str, float], effects: Sequence[Effect]
+) -> frozenset[str]:
+    """Return the names of effects that the motion of the estimation records cannot show, whatever effects are modelled."""
+    terms_of = along_motion(replace(campaign, modelled=()), known)
+    if terms_of is None:
+        return frozenset()
+    return frozenset(effect.name for effect in effects if not terms_of.can_show(effect))
+
+
 def selection_of(
     terms_of: EffectTerms, effects: Sequence[Effect], noise: Floats | None = None
 ) -> Selection | None:

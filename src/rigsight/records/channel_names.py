@@ -64,7 +64,7 @@ _IN_BRACKETS = re.compile(
     r"^(?P<bare>.*?)\s*[\[(<]\s*(?P<unit>[^\[\]()<>]*?[^\W\d_][^\[\]()<>]*?|[%°])\s*[\])>]\s*$"
 )
 _RATE_BEHIND = re.compile(
-    r"^(?P<bare>.+?)(?:\s+(?:in\s+)?|_in_|_)(?P<way>m|mm|cm|rad|mrad|deg)(?:_per_|_|/)s$"
+    r"^(?P<bare>.+?)(?:\s+(?:in\s+)?|_in_|_)(?P<way>m|mm|cm|rad|mrad|deg|(?:in|ft)(?=_per_|/))(?:_per_|_|/)s$"
 )
 _BEHIND = re.compile(r"^(?P<bare>.+?)(?:\s+(?:in\s+)?|_in_|_|,\s*)(?P<unit>[A-Za-zµμ°]+)$")
 
@@ -79,7 +79,7 @@ def split_unit(name: str) -> tuple[str, str | None]:
     if match:
         return match["bare"], f"{match['way']}/s"
     match = _BEHIND.match(name)
-    if match and match["unit"] in _UNITS_BEHIND:
+    if match and match["unit"] in _UNITS_BEHIND and not match["bare"].endswith("per"):
         return match["bare"], match["unit"]
     return name, None
 

@@ -73,8 +73,8 @@ def run_diagnose(
     if out is None:
         return diagnose_campaign(read, effects, seed, jobs, listener)
     folder, check = Path(out), check_of(read, effects, listener)
-    # Whoever reads that a record is faulty need not wait for the verdict.
-    report_notes(check.warnings, listener)
+    # Whoever reads that a record is faulty, or was not read as meant, need not wait for the verdict.
+    report_notes(check.at_once, listener)
 
     def keep(diagnosis: Diagnosis) -> None:
         made_from = origin(read, diagnosis, called, folder, by)

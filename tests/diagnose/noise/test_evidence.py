@@ -62,7 +62,7 @@ def test_a_tone_that_follows_the_swing_of_a_disturbed_mass_explains_nothing() ->
         context = bench_of({"k_3": 2e3}, 0.01, seed)
         reidentified, single, tone, _ = modelled(context)
         assert single.error_over_noise > 3.0
-        if beyond_disturbance(Evidence(context, reidentified, single), [single], [tone]):
+        if beyond_disturbance(Evidence(context, reidentified, single), [single], [single], [tone]):
             passing.append(seed)
     assert len(passing) <= 1
 
@@ -73,7 +73,7 @@ def test_a_second_effect_that_is_there_stands_with_and_without_a_disturbance(for
     context = bench_of({"k_3": 2e3, "T_c": 0.02}, force)
     reidentified, single, tone, friction = modelled(context)
     evidence = Evidence(context, reidentified, single)
-    assert beyond_disturbance(evidence, [single], [tone, friction])[-1] is friction
+    assert beyond_disturbance(evidence, [single], [single], [tone, friction])[-1] is friction
     assert evidence.criterion(friction) < min(evidence.criterion(single), evidence.criterion(tone)) - 100.0
 
 
@@ -102,7 +102,7 @@ def test_what_trades_a_slow_error_for_a_fast_one_gains_nothing() -> None:
         held_out=replace(friction.held_out, residuals=shaken(single.held_out.residuals)),
     )
     assert evidence.gain(friction, single) > 0.0 > evidence.gain(traded, single)
-    assert beyond_disturbance(evidence, [single], [traded]) == []
+    assert beyond_disturbance(evidence, [single], [single], [traded]) == []
 
 
 @pytest.mark.parametrize(

@@ -178,26 +178,26 @@ class OtherForms:
 
 
 def beyond_disturbance(
-    evidence: Evidence, singles: Sequence[FittedModel], larger: Sequence[FittedModel]
+    evidence: Evidence,
+    rivals: Sequence[FittedModel],
+    singles: Sequence[FittedModel],
+    larger: Sequence[FittedModel],
 ) -> list[FittedModel]:
-    """Return the models that explain more than any single effect with a disturbance, and increase no part of the error."""
+    """Return the models that explain more than any rival with a disturbance, and increase no part of the error of their parts."""
     # A disturbance excites the resonances of a rig, and a second effect with its own motion can follow that in each record. If
     # the form of the first is slightly wrong, a second that excites the rig may compensate a slow error but cause a fast one.
-    # Effects without states follow no disturbance in records that they were not fitted to.
-    alone = [model for model in singles if model.residuals]
-    if not larger or not alone:
+    # Rivals are single effects that leave about as little as the best of them.
+    if not larger or not rivals:
         return list(larger)
-    least = min(evidence.criterion(model) for model in alone)
+    least = min(evidence.criterion(model) for model in rivals)
 
     def stands(model: FittedModel) -> bool:
-        parts = [part for part in (*alone, *larger) if part.residuals and set(part.names) < set(model.names)]
+        parts = [
+            part for part in (*singles, *larger) if part.residuals and set(part.names) < set(model.names)
+        ]
         return evidence.criterion(model) < least and all(evidence.gain(model, part) > 0.0 for part in parts)
 
-    return [
-        model
-        for model in larger
-        if not model.residuals or not any(effect.states for effect in model.effects) or stands(model)
-    ]
+    return [model for model in larger if not model.residuals or stands(model)]
 
 
 def with_parts(chosen: Sequence[FittedModel], larger: Sequence[FittedModel]) -> list[FittedModel]:

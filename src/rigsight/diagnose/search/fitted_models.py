@@ -34,7 +34,7 @@ from rigsight.effects import CATALOGUE, Effect, kind_of
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import characteristic_scales
 from rigsight.identify.fit.windows import Windowing, leading_output
-from rigsight.inverse import Proposal, propose
+from rigsight.inverse import Proposal, hidden_effects, propose
 from rigsight.simulate import Structure
 
 
@@ -65,12 +65,13 @@ def single_models(
             f"The equations of {campaign.rig.name} cannot be fitted to the records: {reidentified.fit.message}"
         )
     say("re-identified")
-    proposal = propose(campaign, {**campaign.constants, **reidentified.fit.values}, effects, context.noise)
+    known = {**campaign.constants, **reidentified.fit.values}
+    proposal = propose(campaign, known, effects, context.noise)
     say("missing force")
     offered = {kind_of(effect.name) for effect in candidates_on(campaign.rig, CATALOGUE, campaign.modelled)}
     are_chosen = not offered <= {kind_of(effect.name) for effect in effects}
-    if proposal is not None:
-        effects = [effect for effect in effects if effect.name not in proposal.hidden]
+    hidden = hidden_effects(campaign, known, effects) if proposal is None else proposal.hidden
+    effects = [effect for effect in effects if effect.name not in hidden]
     worth = worth_fitting(campaign.rig, proposal, effects)
     if are_chosen:
         worth = replace(worth, alone=tuple(effects), are_chosen=True)
