@@ -54,7 +54,8 @@ def placed_diagnosis(*effects: tuple[str, str], looked_at: tuple[str, ...] = ("s
             for place in ("shaft", "load_bearing", "motor", "load_angle")
         ],
         "families": [
-            {"family": family_of(name), "where": place, "probability": 0.9} for name, place in effects
+            {"family": family_of(name), "where": place, "probability": 0.9, "share": {"value": 0.5}}
+            for name, place in effects
         ],
     }
 
@@ -257,6 +258,13 @@ def test_the_truth_among_what_cannot_be_told_apart_is_at_its_place() -> None:
     elsewhere = found | {"ambiguous_with": [["coulomb_friction@shaft"]]}
     assert held(placed_key(FRICTION), alike).right_within_set
     assert not held(placed_key(FRICTION), elsewhere).right_within_set
+
+
+def test_a_hysteresis_that_the_diagnosis_calls_dry_friction_is_of_that_family() -> None:
+    truth, found = placed_key(("coulomb_friction", "shaft")), placed_diagnosis(("iwan_hysteresis", "shaft"))
+    assert held(truth, found).family_right is False
+    found["families"][0]["family"] = "dry_friction"
+    assert held(truth, found).family_right is True
 
 
 def test_a_relative_at_its_place_is_of_the_right_family() -> None:

@@ -252,7 +252,7 @@ def outcome(
         message=message,
         condition=str(key.get("condition", "")),
         families=tuple(family_of(name) for name in _kinds(truth)),
-        family_right=wanted <= _families(named) if truth else None,
+        family_right=wanted <= _named_families(found, named, by_place) if truth else None,
         family_probability=min(of_families.get(one, 0.0) for one in wanted) if wanted else None,
     )
 
@@ -279,6 +279,19 @@ def effects_at_places(said: Mapping[str, Any], by_place: bool) -> frozenset[tupl
 def _families(effects: frozenset[tuple[str, str]]) -> frozenset[tuple[str, str]]:
     """Return the family of each effect at its place."""
     return frozenset((family_of(name), place) for name, place in effects)
+
+
+def _named_families(
+    found: Mapping[str, Any], named: frozenset[tuple[str, str]], by_place: bool
+) -> frozenset[tuple[str, str]]:
+    """Return the families that a diagnosis names at their places: a hysteresis may be one of dry friction."""
+    if not named or "families" not in found:
+        return _families(named)
+    return frozenset(
+        (one["family"], one["where"] if by_place else "")
+        for one in found["families"]
+        if one["share"]["value"] > 0.0
+    )
 
 
 def _kinds(effects: frozenset[tuple[str, str]]) -> tuple[str, ...]:

@@ -107,7 +107,7 @@ def windowing_of(
     # alone, records are cut into windows.
     sensors, poles = followed_sensors(campaign.rig, campaign.records), _poles(campaign)
     limit = longest_free_run(poles, campaign.estimation)
-    if not sensors or (limit is not None and not campaign.rig.has_one_motion):
+    if not sensors:
         longest = window_length(campaign.rig, campaign.estimation)
         return Windowing(min(longest, limit or longest)), dict.fromkeys(noise, 1.0)
     typical = 2.0 * np.pi / typical_period(campaign.rig, campaign.estimation)
