@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -150,3 +150,29 @@ def scored() -> MakeScored:
         return FittedModel(chosen, fit, fit, error_over_noise)
 
     return make
+
+
+def with_numbers(model: FittedModel, values: dict[str, float], errors: dict[str, float]) -> FittedModel:
+    """Return a scored model with numbers and their standard errors."""
+    fit = replace(model.fit, values=values, standard_errors=errors, free=tuple(values), success=True)
+    return replace(model, fit=fit)
+
+
+@pytest.fixture
+def friction_models(scored: MakeScored) -> tuple[FittedModel, FittedModel, FittedModel]:
+    """Return equations, with Coulomb friction, and with Stribeck friction whose number the records do not determine."""
+    reidentified = with_numbers(
+        scored((), error_over_noise=20.0), {"m": 1.0, "d": 1.0, "k": 100.0}, dict.fromkeys("mdk", 0.1)
+    )
+    own = {"m": 1.0, "d": 1.0, "k": 100.0}
+    coulomb = with_numbers(
+        scored(("coulomb_friction",), residuals=np.full(9, 5.5)),
+        {**own, "T_c": 0.5},
+        dict.fromkeys([*"mdk", "T_c"], 0.1),
+    )
+    stribeck = with_numbers(
+        scored(("stribeck_friction",), residuals=np.full(9, 5.0)),
+        {**own, "T_c": 0.5, "T_s": 1.0, "w_s": 0.1},
+        {**dict.fromkeys([*"mdk", "T_c"], 0.1), "T_s": np.inf, "w_s": np.inf},
+    )
+    return reidentified, coulomb, stribeck

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.search.possible_cause import (
     has_size_of_zero,
     is_beyond_records,
@@ -17,40 +16,20 @@ from rigsight.diagnose.search.possible_cause import (
     leading,
 )
 
-
-def with_numbers(model: FittedModel, values: dict[str, float], errors: dict[str, float]) -> FittedModel:
-    fit = replace(model.fit, values=values, standard_errors=errors, free=tuple(values), success=True)
-    return replace(model, fit=fit)
+from ..conftest import with_numbers
 
 
-@pytest.fixture
-def models(scored):
-    reidentified = with_numbers(
-        scored((), error_over_noise=20.0), {"m": 1.0, "d": 1.0, "k": 100.0}, dict.fromkeys("mdk", 0.1)
-    )
-    own = {"m": 1.0, "d": 1.0, "k": 100.0}
-    coulomb = with_numbers(
-        scored(("coulomb_friction",), residuals=np.full(9, 5.5)),
-        {**own, "T_c": 0.5},
-        dict.fromkeys([*"mdk", "T_c"], 0.1),
-    )
-    stribeck = with_numbers(
-        scored(("stribeck_friction",), residuals=np.full(9, 5.0)),
-        {**own, "T_c": 0.5, "T_s": 1.0, "w_s": 0.1},
-        {**dict.fromkeys([*"mdk", "T_c"], 0.1), "T_s": np.inf, "w_s": np.inf},
-    )
-    return reidentified, coulomb, stribeck
-
-
-def test_an_effect_none_of_whose_numbers_the_records_determine_is_undetermined(models) -> None:
-    reidentified, coulomb, stribeck = models
+def test_an_effect_none_of_whose_numbers_the_records_determine_is_undetermined(friction_models) -> None:
+    reidentified, coulomb, stribeck = friction_models
     assert not any(is_undetermined(model, reidentified) for model in (reidentified, coulomb, stribeck))
     errors = {**coulomb.fit.standard_errors, "T_c": np.inf}
     assert is_undetermined(replace(coulomb, fit=replace(coulomb.fit, standard_errors=errors)), reidentified)
 
 
-def test_an_effect_that_opens_a_common_factor_is_undetermined_unless_it_is_open_without_it(models) -> None:
-    reidentified, coulomb, _ = models
+def test_an_effect_that_opens_a_common_factor_is_undetermined_unless_it_is_open_without_it(
+    friction_models,
+) -> None:
+    reidentified, coulomb, _ = friction_models
     beside = replace(coulomb.fit, standard_errors=dict.fromkeys(coulomb.fit.free, np.inf))
     opened = replace(coulomb, fit=beside)
     assert is_undetermined(opened, reidentified)
