@@ -23,6 +23,9 @@ SHOWS_SPEED = rig_of_text(
     ),
     "motor.toml",
 )
+COUNTED = TEXT.format(kinetic="J*d(q)^2/2", potential="0", constants="").replace(
+    '[sensors.angle]\nreads = "q"\nunit = "rad"', '[sensors.speed]\nreads = "abs(d(q))"\nunit = "rad/s"'
+)
 OF_POSITION = {"cubic_stiffness", "gravity_pendulum", "end_stop", "position_dependent_damping"}
 VALUES = {"J": 2e-3, "k_v": 0.6, "d": 0.02, "T_c": 0.05}
 DT = 5e-3
@@ -64,6 +67,12 @@ def test_what_a_motion_cannot_show_does_not_depend_on_effects_that_are_modelled(
     offered = candidates_on(SHOWS_SPEED, CATALOGUE, campaign.modelled)
     assert propose(campaign, {**VALUES, "c_b": 0.1}, offered) is None
     assert set(map(kind_of, hidden_effects(campaign, VALUES, offered))) >= OF_POSITION
+    # Magnitudes of the speed do not show the motion.
+    counted = rig_of_text(COUNTED, "motor.toml")
+    rectified = Campaign("motor", counted, {}, {}, (run.with_signals(speed=np.abs(run["speed"])),))
+    assert propose(rectified, VALUES, candidates_on(counted, CATALOGUE)) is None
+    hidden = set(map(kind_of, hidden_effects(rectified, VALUES, candidates_on(counted, CATALOGUE))))
+    assert hidden == {*OF_POSITION, "asymmetric_stiffness", "power_law_stiffness"}
 
 
 def test_a_free_motion_that_is_read_later_is_another_one_of_the_same_equations() -> None:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from rigsight.campaign import Campaign
 from rigsight.effects import Effect, Place
+from rigsight.effects import symbols as canonical
 from rigsight.errors import SimulationError
 from rigsight.identify import characteristic_scales
 from rigsight.inverse.drive_gain import gains_of_known_scale
@@ -38,6 +39,7 @@ from rigsight.inverse.proposal import Proposal
 from rigsight.inverse.selection import Selection
 from rigsight.inverse.term import Term
 from rigsight.inverse.tone_terms import of_tone
+from rigsight.rigs.rig import joint_of
 from rigsight.simulate import compose
 
 Floats = NDArray[np.float64]
@@ -92,9 +94,22 @@ def hidden_effects(
 ) -> frozenset[str]:
     """Return the names of effects that the motion of the estimation records cannot show, whatever effects are modelled."""
     terms_of = along_motion(replace(campaign, modelled=()), known)
-    if terms_of is None:
-        return frozenset()
-    return frozenset(effect.name for effect in effects if not terms_of.can_show(effect))
+    if terms_of is not None:
+        return frozenset(effect.name for effect in effects if not terms_of.can_show(effect))
+    # Sensors that lose a sign do not show the motion; a position that no sensor reads and no force needs may be any.
+    mechanism = campaign.rig.mechanism
+    needed = [*(sensor.reads for sensor in mechanism.sensors), *(drive.signal for drive in mechanism.drives)]
+    needed += [*mechanism.generalized_forces, *(joint.force for joint in mechanism.joints)]
+    needed += [joint.motion for joint in mechanism.joints if joint.stiffness != 0]
+    known_ones = set().union(*(expression.free_symbols for expression in needed))
+    return frozenset(
+        effect.name
+        for effect in effects
+        if effect.place is Place.DYNAMICS
+        and effect.reads(canonical.x)
+        and not effect.states
+        and known_ones.isdisjoint(joint_of(campaign.rig, effect).motion.free_symbols)
+    )
 
 
 def selection_of(
