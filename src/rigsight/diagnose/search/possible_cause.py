@@ -1,13 +1,14 @@
 """Can a fitted model be the cause? Each effect has a size, the records determine it, and are as long as it is slow or long.
 
-What cannot be the cause leads neither the search nor the ranking, however little it leaves: a resonance slower than the records
-follows each of them by its free initial states.
+What cannot be the cause does not lead the ranking, however little it leaves. A resonance slower than the records follows each of
+them by its free initial states: it does not lead the search, either. Standard errors count in the ranking only: not all fits of
+the search are finished.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.stats import chi2, norm
@@ -24,21 +25,18 @@ def can_be_cause(
     context: FitContext, model: FittedModel, reidentified: FittedModel, models: Sequence[FittedModel]
 ) -> bool:
     """Return True for a model whose effects the records show, compared with the equations and the other models."""
-    duration = max(record.duration for record in context.records)
     return (
         not has_size_of_zero(model, [reidentified, *models])
         and not is_undetermined(model, reidentified)
-        and not is_beyond_records(model, context.scales, duration)
+        and not is_beyond_records(model, context)
     )
 
 
-def leading(
-    context: FitContext, singles: Sequence[FittedModel], reidentified: FittedModel
-) -> FittedModel | None:
-    """Return the best single effect that can be the cause; where none can, the best of all."""
+def leading(context: FitContext, singles: Sequence[FittedModel]) -> FittedModel | None:
+    """Return the best single effect that is not slower or longer than the records; where all are, the best of them."""
     usable = [model for model in singles if model.residuals and np.isfinite(model.error_over_noise)]
-    possible = [model for model in usable if can_be_cause(context, model, reidentified, usable)]
-    return min(possible or usable, key=lambda model: model.error_over_noise, default=None)
+    within = [model for model in usable if not is_beyond_records(model, context)]
+    return min(within or usable, key=lambda model: model.error_over_noise, default=None)
 
 
 def is_undetermined(model: FittedModel, reidentified: FittedModel) -> bool:
@@ -72,12 +70,13 @@ def has_size_of_zero(model: FittedModel, others: Sequence[FittedModel]) -> bool:
     return any(map(is_zero, model.effects))
 
 
-def is_beyond_records(model: FittedModel, scales: Mapping[str, float], duration: float) -> bool:
+def is_beyond_records(model: FittedModel, context: FitContext) -> bool:
     """Return True if an effect is slower, longer or coarser than the records can show: it is another spring."""
     # Its wave is longer than the motion, its time constant or period longer than every record [s], or the length over which it
     # yields beyond its search; or the periods of a tone are too few in each record. A delay must leave the larger part of a
     # record: before, the reading is what it was at the start, whatever the input.
-    fit = model.fit
+    fit, scales = model.fit, context.scales
+    duration = max(record.duration for record in context.records)
 
     def is_delay(effect: Effect, parameter: Parameter) -> bool:
         late = (effect.delay, effect.reading_delay, effect.command_delay)

@@ -27,7 +27,7 @@ from rigsight.diagnose.search.evidence_for_more import chance_of_further_cause
 from rigsight.diagnose.search.first_look import FirstLook
 from rigsight.diagnose.search.nested_models import in_lowest_basins, without_repeated_equations
 from rigsight.diagnose.search.one_more_effect import each_once, part_of, reduced, with_causes, with_one_more
-from rigsight.diagnose.search.possible_cause import can_be_cause, leading
+from rigsight.diagnose.search.possible_cause import is_beyond_records, leading
 from rigsight.diagnose.search.single_effects import finished, followed, refine
 from rigsight.diagnose.search.together import Together
 from rigsight.diagnose.search.worth_fitting import SingleModels
@@ -48,7 +48,7 @@ class SeveralEffects:
 
     context: FitContext  # records, scales and noise
     singles: Sequence[FittedModel]  # every effect alone that could be simulated, best first
-    best: FittedModel  # the best of those that can be the cause
+    best: FittedModel  # the best of those that are not slower or longer than the records
     # The families that the motion names; None where it does not show the missing force.
     proposal: Proposal | None
     named: FittedModel | None  # all causes that it names, fitted together
@@ -73,7 +73,7 @@ class SeveralEffects:
                 return []
             pairs = zip(model.effects, parts, strict=True)
             others = [other for effect, part in pairs for other in self.exchanged(model, effect, part)]
-            rivals = [*self._possible(others), *models, *larger[:-1], *parts]
+            rivals = [*self._within_records(others), *models, *larger[:-1], *parts]
             models = self._compared(finished(self.context, model), rivals)
         several = [model for model in models if len(model.effects) > 1]
         return larger_first(without_repeated_equations(self.context, several), self.singles)
@@ -99,13 +99,11 @@ class SeveralEffects:
             for size in (2, 3):
                 sets = self.together.fitted(size, self._least_share)
                 models += [one for one in sets if self._is_worth(one, best)]
-        return self._possible(models)
+        return self._within_records(models)
 
-    def _possible(self, models: Sequence[FittedModel]) -> list[FittedModel]:
-        """Return the models that can be the cause: what follows each record by its own states would lead."""
-        return [
-            m for m in models if can_be_cause(self.context, m, self.reidentified, [*self.singles, *models])
-        ]
+    def _within_records(self, models: Sequence[FittedModel]) -> list[FittedModel]:
+        """Return the models without those whose effects are slower or longer than the records."""
+        return [model for model in models if not is_beyond_records(model, self.context)]
 
     def _named_first(self) -> list[FittedModel]:
         """Return the best single of the first family that the motion names, if a single of another one is the best."""
@@ -146,7 +144,7 @@ class SeveralEffects:
             larger_ones = with_one_more(self.context, model, further, self.singles, self._least_share, enough)
             if beside is not None and (new := self._new(beside, model)):
                 larger_ones.append(with_causes(self.context, model, new, beside))
-            best = min(self._possible(larger_ones), key=_error, default=model)
+            best = min(self._within_records(larger_ones), key=_error, default=model)
             if not self._is_worth(best, model):
                 break
             model = best
@@ -238,7 +236,7 @@ def several_effects(models: SingleModels, ask: Ask, checks: Checks, lower_bound:
     """Return models of several effects if a single effect does not explain everything."""
     # `ask` says what the motion shows of the force that a model leaves.
     context, reidentified, worth = models.context, models.reidentified, models.worth
-    best = leading(context, models.singles, reidentified)
+    best = leading(context, models.singles)
     if best is None:
         return []
     usable = sorted(

@@ -216,7 +216,7 @@ def single_models(reidentified: FittedModel, single: FittedModel, worth: WorthFi
 @pytest.fixture
 def any_single_leads(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whether a scored model can be the cause, which was not fitted, is not asked."""
-    monkeypatch.setattr(several, "leading", lambda _context, singles, _reidentified: singles[0])
+    monkeypatch.setattr(several, "leading", lambda _context, singles: singles[0])
 
 
 @pytest.mark.usefixtures("any_single_leads")
