@@ -80,6 +80,7 @@ def test_a_cause_that_the_motion_names_is_not_said_to_close_the_gap(
     unsure = verdict_sentence(replace(found, families=(replace(friction, probability=0.26),)))
     assert "may be mainly explained by Coulomb friction" in unsure
     assert "(probability 26 %, more than any other cause)" in unsure
+    assert verdict_name(replace(found, families=(replace(friction, probability=0.26),))) == "Possible cause"
 
 
 def test_no_gap_far_above_the_floor_says_that_the_floor_seems_too_low(

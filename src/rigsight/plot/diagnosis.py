@@ -132,11 +132,11 @@ def gap_budget(diagnosis: Diagnosis, after_label: str, labels: Mapping[str, str]
         if diagnosis.effects:
             steps.append((after_label, gap.reidentified, gap.after, WITH_EFFECT))
         if len(steps) > 1:
-            steps.append(("Left over", 0.0, gap.after if diagnosis.effects else gap.reidentified, MEASURED))
+            steps.append(("Remaining", 0.0, gap.after if diagnosis.effects else gap.reidentified, MEASURED))
         finite = [100.0 * v for v in (gap.before, gap.reidentified, gap.after) if np.isfinite(v)]
         right = max([*finite, 100.0 * gap.noise_floor if np.isfinite(gap.noise_floor) else 0.0, 1e-12])
         for row, (name, start, stop, color) in enumerate(steps):
-            is_total = row == 0 or name == "Left over"
+            is_total = row == 0 or name == "Remaining"
             _waterfall_step(ax, row, 100.0 * start, 100.0 * stop, color, right, is_total)
         if np.isfinite(gap.noise_floor):
             ax.axvline(100.0 * gap.noise_floor, **FLOOR_LINE)
@@ -147,7 +147,7 @@ def gap_budget(diagnosis: Diagnosis, after_label: str, labels: Mapping[str, str]
             )  # fmt: skip
         ax.set_yticks(range(len(steps)), [step[0] for step in steps])
         ax.set_ylim(len(steps) - 0.45, -0.6)
-        ax.set_xlim(0.0, 1.18 * right)
+        ax.set_xlim(0.0, 1.3 * right)
         ax.tick_params(axis="y", length=0)
         ax.set_title(labels[output], pad=14)
         ax.grid(axis="x")

@@ -45,6 +45,8 @@ _LAWS_NAMED = 3
 
 def verdict_name(diagnosis: Diagnosis) -> str:
     """Return the verdict in two words."""
+    if diagnosis.verdict == "effect" and diagnosis.probability < FAMILIES.probable:
+        return "Possible cause"
     if diagnosis.verdict == "effect" and _leaves_more(diagnosis):
         return "Main cause"
     return _VERDICT_NAMES[diagnosis.verdict]
