@@ -152,8 +152,8 @@ def yielding_note(basis: Basis) -> str | None:
         part = yielding_part(model, effect, scales)
         if part is not None and part < FAMILIES.yields_at_once:
             return (
-                f"{effect.name} yields over {part:.2g} of the motion, less than a tenth: it counts as dry friction, which gives "
-                f"way elastically before it slides."
+                f"{effect.name} yields over {part:.1%} of the motion, less than {FAMILIES.yields_at_once:.0%}: it counts as dry "
+                "friction, which gives way elastically before it slides."
             )
     return None
 
