@@ -74,10 +74,10 @@ class Check:
     matrix: EffectMatrix
 
     @property
-    def at_once(self) -> tuple[str, ...]:
-        """Faults and warnings, each with what to do, and how each record was read: what is to be known before a fit."""
-        told = (r for r in self.remarks if r.severity != "note" or r.record is not None)
-        return tuple(f"{r.sentence} {r.remedy}".strip() for r in told)
+    def before_a_fit(self) -> tuple[str, ...]:
+        """What to know before a fit: faults and warnings, each with what to do, and how each record was read."""
+        reported = (r for r in self.remarks if r.severity != "note" or r.record is not None)
+        return tuple(f"{r.sentence} {r.remedy}".strip() for r in reported)
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``check.json``."""

@@ -333,14 +333,14 @@ def _check_summary(found: Check) -> Group:
         words = [rival.visible] if rival.visible else []
         words += [f"{by}: {names}" for by, names in rival.others]
         apart.append((rival.effect, rival.where, "; ".join(words)))
-        group = rival.visible or "is not told apart from all other families"
+        group = rival.visible or "shows, but is not told apart from some effect of another family"
         groups.setdefault(group, []).append(f"{rival.effect} at {rival.where}")
     alike = [f"Forms of {family} that are not told apart: {names}." for family, names in forms(found.matrix)]
     heads = ("Effect", "Where", "Not told apart from")
     effects = [table(heads, apart)] if apart else ["All families of effects can be told apart."]
     if len(apart) > _MOST_ROWS:
-        effects = [f"What {group}: {', '.join(names)}." for group, names in groups.items()]
-        effects.append(f"Which effects and forms are not told apart from which others: see {CHECK_PAGE}.")
+        effects = [f"{group[:1].upper()}{group[1:]}: {', '.join(names)}." for group, names in groups.items()]
+        effects.append(f"{CHECK_PAGE} shows which effects and forms are not told apart.")
         alike = []
     if found.matrix.hidden:
         alike.append(

@@ -316,7 +316,7 @@ def _rest_notes(
     held = [signal.name for signal in recorded if signal.name in raw]
     if not held or not all(is_constant(raw[signal]) for signal in held):
         return []
-    values = ", ".join(f"{signal} = {raw[signal][0]:g}" for signal in held)
+    values = ", ".join(f"{signal} = {raw[signal][0] + 0.0:g}" for signal in held)
     listed = ", ".join(f"'{table.labels[signal]}'" for signal in held)
     where = f"{path.name}, column{'s' if len(held) > 1 else ''} {listed}"
     if is_step and any(raw[signal][0] != 0.0 for signal in held):

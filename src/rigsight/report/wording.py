@@ -161,7 +161,7 @@ def _effect_sentence(diagnosis: Diagnosis) -> str:
     if diagnosis.probability < FAMILIES.probable:
         # Nobody would bet on it.
         gap, force = (f"may be {mainly}{own} by " for own in ("caused", "explained"))
-        cause += f" (probability {percent(diagnosis.probability)}, more than any other cause)"
+        cause += f" (probability {percent(diagnosis.probability)})"
     else:
         likely = "most likely " if diagnosis.ambiguous_with else ""
         gap, force = (f"is {likely}{mainly}{own} by " for own in ("caused", "explained"))

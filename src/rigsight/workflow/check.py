@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rigsight.campaign import Campaign
@@ -14,7 +15,7 @@ from rigsight.rigs import Rig
 from rigsight.workflow.campaign.in_memory import campaign_of_rig, is_rig_file
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.own.own_effects import candidates_of
-from rigsight.workflow.run.progress import Listener, Stage, report_notes, silent
+from rigsight.workflow.run.progress import Listener, Stage, silent
 from rigsight.workflow.run.results import check_writable, json_text, versions, write_together
 
 CHECK_FILE, CHECK_PAGE = "check.json", "check.html"
@@ -33,9 +34,13 @@ def run_check(
     """Return what the records of a campaign, or a simulated sweep of a rig file, can show, and write it into a folder."""
     check_writable(out, CHECK_FILE, CHECK_PAGE)
     path = Path(campaign)
-    read = campaign_of_rig(path) if is_rig_file(path) else read_campaign(path, own_effects, own_rigs)
-    report_notes(read.notes, listener)
+    is_rig = is_rig_file(path)
+    read = campaign_of_rig(path) if is_rig else read_campaign(path, own_effects, own_rigs)
     found = check_of(read, effects, listener)
+    if is_rig:
+        # What is noted of the simulated sweep says nothing of records to come.
+        kept = (r for r in found.remarks if r.severity != "note" or r.sentence in read.notes)
+        found = replace(found, remarks=tuple(kept))
     write_together(out, check_files(found, command))
     return found
 

@@ -74,7 +74,7 @@ def run_diagnose(
         return diagnose_campaign(read, effects, seed, jobs, listener)
     folder, check = Path(out), check_of(read, effects, listener)
     # Whoever reads that a record is faulty, or was not read as meant, need not wait for the verdict.
-    report_notes(check.at_once, listener)
+    report_notes(check.before_a_fit, listener)
 
     def keep(diagnosis: Diagnosis) -> None:
         made_from = origin(read, diagnosis, called, folder, by)

@@ -82,7 +82,7 @@ def test_validation_records_are_scored_and_never_fitted(linear: Identification) 
 
 
 def test_a_validation_amplitude_outside_what_was_identified_is_told(linear: Identification) -> None:
-    reported = [warning for warning in linear.warnings if "than the fitted records" in warning]
+    reported = [warning for warning in linear.warnings if "than in the fitted records" in warning]
     assert len(reported) == 1
     assert "'beyond'" in reported[0]
     assert "1.5 A" in reported[0]

@@ -151,7 +151,7 @@ def beyond_identified_amplitudes(campaign: Campaign) -> list[str]:
         span = f"{low:.3g} {unit}" if one else f"{low:.3g} to {high:.3g} {unit}"
         than = "smaller" if size < low else "larger"
         reported.append(
-            f"Validation record '{record.name}' has an amplitude of {size:.3g} {unit}, {than} than the fitted records ({span}): "
-            "its score shows how well the model extrapolates, not how well it was identified."
+            f"Validation record '{record.name}' has an amplitude of {size:.3g} {unit}, {than} than in the fitted records "
+            f"({span}): its score shows how well the model extrapolates, not how well it was identified."
         )
     return reported
