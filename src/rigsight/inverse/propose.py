@@ -92,23 +92,34 @@ def propose(
 def hidden_effects(
     campaign: Campaign, known: Mapping[str, float], effects: Sequence[Effect]
 ) -> frozenset[str]:
-    """Return the names of effects that the motion of the estimation records cannot show, whatever effects are modelled."""
+    """Return the names of effects that the motion of the estimation records cannot show, whatever effects are modelled.
+
+    Parameters
+    ----------
+    campaign
+        Records and rig.
+    known
+        Constants and parameters of the rig.
+    effects
+        Candidates at their places.
+    """
     terms_of = along_motion(replace(campaign, modelled=()), known)
     if terms_of is not None:
         return frozenset(effect.name for effect in effects if not terms_of.can_show(effect))
-    # Sensors that lose a sign do not show the motion; a position that no sensor reads and no force needs may be any.
+    # Sensors that lose a sign do not show the motion. Of a position that nothing reads and no force depends on, only changes are
+    # known.
     mechanism = campaign.rig.mechanism
-    needed = [*(sensor.reads for sensor in mechanism.sensors), *(drive.signal for drive in mechanism.drives)]
-    needed += [*mechanism.generalized_forces, *(joint.force for joint in mechanism.joints)]
-    needed += [joint.motion for joint in mechanism.joints if joint.stiffness != 0]
-    known_ones = set().union(*(expression.free_symbols for expression in needed))
+    depend = [*(sensor.reads for sensor in mechanism.sensors), *(drive.signal for drive in mechanism.drives)]
+    depend += [*mechanism.generalized_forces, *(joint.force for joint in mechanism.joints)]
+    depend += [joint.motion for joint in mechanism.joints if joint.stiffness != 0]
+    determined = set().union(*(expression.free_symbols for expression in depend))
     return frozenset(
         effect.name
         for effect in effects
         if effect.place is Place.DYNAMICS
         and effect.reads(canonical.x)
         and not effect.states
-        and known_ones.isdisjoint(joint_of(campaign.rig, effect).motion.free_symbols)
+        and determined.isdisjoint(joint_of(campaign.rig, effect).motion.free_symbols)
     )
 
 

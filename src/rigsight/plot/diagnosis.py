@@ -41,6 +41,8 @@ _NAMES = 9.0
 """Size of letters beside bars [points]."""
 _ERRORS = 8.5
 """Size of letters of an error at the end of its bar [points]."""
+_OFF_BAR = 4.0
+"""Distance of an error from the end of its bar [points]."""
 _LONGEST_NAME = 42
 """Letters of a name on one line."""
 _FURTHER_LINE = 0.5
@@ -121,6 +123,8 @@ def gap_budget(diagnosis: Diagnosis, after_label: str, labels: Mapping[str, str]
     outputs = list(diagnosis.gap)
     figure = new_figure(PAGE_WIDTH, 0.45 + 1.75 * max(1, len(outputs)), layout=None)
     axes = figure.subplots(max(1, len(outputs)), 1, squeeze=False)[:, 0]
+    names = ["Refitting its parameters" if is_given else "Identified", after_label]
+    margins = 0.14 + text_width(names, _NAMES), 0.1
     for ax, output in zip(axes, outputs, strict=False):
         gap = diagnosis.gap[output]
         steps = [("Identified", 0.0, gap.reidentified, REIDENTIFIED)]
@@ -135,9 +139,12 @@ def gap_budget(diagnosis: Diagnosis, after_label: str, labels: Mapping[str, str]
             steps.append(("Remaining", 0.0, gap.after if diagnosis.effects else gap.reidentified, MEASURED))
         finite = [100.0 * v for v in (gap.before, gap.reidentified, gap.after) if np.isfinite(v)]
         right = max([*finite, 100.0 * gap.noise_floor if np.isfinite(gap.noise_floor) else 0.0, 1e-12])
-        for row, (name, start, stop, color) in enumerate(steps):
-            is_total = row == 0 or name == "Remaining"
-            _waterfall_step(ax, row, 100.0 * start, 100.0 * stop, color, right, is_total)
+        errors = [
+            _waterfall_step(
+                ax, row, 100.0 * start, 100.0 * stop, color, is_total=row == 0 or name == "Remaining"
+            )
+            for row, (name, start, stop, color) in enumerate(steps)
+        ]
         if np.isfinite(gap.noise_floor):
             ax.axvline(100.0 * gap.noise_floor, **FLOOR_LINE)
             ax.annotate(
@@ -147,26 +154,43 @@ def gap_budget(diagnosis: Diagnosis, after_label: str, labels: Mapping[str, str]
             )  # fmt: skip
         ax.set_yticks(range(len(steps)), [step[0] for step in steps])
         ax.set_ylim(len(steps) - 0.45, -0.6)
-        ax.set_xlim(0.0, 1.3 * right)
+        ax.set_xlim(0.0, right / (1.0 - _share_of_axis(errors, margins)))
         ax.tick_params(axis="y", length=0)
         ax.set_title(labels[output], pad=14)
         ax.grid(axis="x")
     axes[-1].set_xlabel("gap [% of the measured RMS]")
-    names = ["Refitting its parameters" if is_given else "Identified", after_label]
-    set_margins(figure, 0.14 + text_width(names, _NAMES), 0.1, 0.48, 0.42, between=(0.0, 0.66))
+    set_margins(figure, *margins, 0.48, 0.42, between=(0.0, 0.66))
     return figure
 
 
-def _waterfall_step(
-    ax: Axes, row: int, start: float, stop: float, color: str, right: float, is_total: bool
-) -> None:
+def _waterfall_step(ax: Axes, row: int, start: float, stop: float, color: str, *, is_total: bool) -> str:
+    """Draw a bar with its error beside it, and return this."""
     if not (np.isfinite(start) and np.isfinite(stop)):
-        ax.text(0.01 * right, row, "not finite", va="center", fontsize=8)
-        return
+        _beside_bar(ax, "not finite", 0.0, row)
+        return "not finite"
     low, high = sorted((start, stop))
     ax.barh(row, high - low, left=low, height=0.62, color=color)
     text = f"{stop:.3g} %" if is_total else f"{'−' if stop <= start else '+'}{abs(stop - start):.3g} %"
-    ax.text(high + 0.012 * right, row, text, va="center", fontsize=8.5, color=FLOOR)
+    _beside_bar(ax, text, high, row)
+    return text
+
+
+def _beside_bar(ax: Axes, text: str, end: float, row: float) -> None:
+    ax.annotate(
+        text,
+        (end, row),
+        (_OFF_BAR, 0),
+        textcoords="offset points",
+        va="center",
+        fontsize=_ERRORS,
+        color=FLOOR,
+    )
+
+
+def _share_of_axis(errors: Sequence[str], margins: tuple[float, float]) -> float:
+    """Return the share of an axis that the longest error takes beside its bar; margins [inch]."""
+    room = text_width([f"{error} " for error in errors], _ERRORS) + _OFF_BAR / 72.0
+    return room / (PAGE_WIDTH - sum(margins))
 
 
 @style()
@@ -194,15 +218,11 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
         hatch = "////" if candidate.effects in tied else None
         error = candidate.error_over_noise
         ax.barh(row, error - left, left=left, height=0.62, color=color, hatch=hatch, edgecolor="white")
-        ax.annotate(f"{error:.3g} ×", (max(error, left), row), (4, 0),
-                    textcoords="offset points", va="center", fontsize=_ERRORS, color=FLOOR)  # fmt: skip
+        _beside_bar(ax, f"{error:.3g} ×", max(error, left), row)
     ax.set_xscale("log")
     lines = [line for name in shown for line in name.split("\n")]
     margins = 0.14 + text_width(lines, _NAMES), 0.1
-    # The longest bar leaves room for an error beside it.
-    room = (text_width([f"{error:.3g} × " for error in finite], _ERRORS) + 4 / 72) / (
-        PAGE_WIDTH - sum(margins)
-    )
+    room = _share_of_axis([f"{error:.3g} ×" for error in finite], margins)
     ax.set_xlim(left, right * (right / left) ** (room / (1.0 - room)))
     plain_log_ticks(ax, left, right)
     ax.axvline(1.0, **FLOOR_LINE)

@@ -157,21 +157,28 @@ def _effect_sentence(diagnosis: Diagnosis) -> str:
     # What wrong numbers cause is closed by refitting them, and is no share of the effect.
     of = " that refitting leaves" if is_given(diagnosis) else ""
     by_motion = _is_named_by_motion(diagnosis)
+    subject = "the force that the equations lack along the measured motion" if by_motion else "the gap"
+    verb = "explained" if by_motion else "caused"
     mainly = "mainly " if by_motion or _leaves_more(diagnosis) else ""
     if diagnosis.probability < FAMILIES.probable:
         # Nobody would bet on it.
-        gap, force = (f"may be {mainly}{own} by " for own in ("caused", "explained"))
-        cause += f" (probability {percent(diagnosis.probability)})"
+        claim = f"{subject} may be {mainly}{verb} by {cause} (probability {percent(diagnosis.probability)})"
+    elif not diagnosis.ambiguous_with:
+        claim = f"{subject} is {mainly}{verb} by {cause}"
     else:
-        likely = "most likely " if diagnosis.ambiguous_with else ""
-        gap, force = (f"is {likely}{mainly}{own} by " for own in ("caused", "explained"))
+        claim = (
+            f"most likely {subject} is {mainly}{verb} by {cause}"
+            if mainly
+            else f"{subject} is most likely {verb} by {cause}"
+        )
+    claim = f"{claim[0].upper()}{claim[1:]}"
     if by_motion:
         share = percent(max(own.share for own in diagnosis.families))
         return (
-            f"The force that the equations lack along the measured motion {force}{cause}: {share} of the square of that force. "
+            f"{claim}: {share} of the square of that force. "
             f"Simulated, adding {it} {_shrinks(refitted, after, of)}; with {it} {times_floor(after)} remains."
         )
-    return f"The gap {gap}{cause}; adding {it} {_shrinks(refitted, after, of)}, down to {times_floor(after)}."
+    return f"{claim}; adding {it} {_shrinks(refitted, after, of)}, down to {times_floor(after)}."
 
 
 def _cause_label(diagnosis: Diagnosis) -> str:
