@@ -113,7 +113,7 @@ def test_names_from_files_are_text_and_never_markup(page_of: Callable[[str], str
 
 def test_the_page_says_verdict_and_evidence(page_of: Callable[[str], str], diagnosis: Diagnosis) -> None:
     words = Page(page_of("effect")).words()
-    assert "most likely caused by Bouc-Wen hysteresis in the yaw dynamics" in words
+    assert "Most likely the gap is caused by Bouc-Wen hysteresis in the yaw dynamics" in words
     assert "cannot tell Bouc-Wen hysteresis from Coulomb friction and cubic stiffness" in words
     assert "yaw angle psi" in words
     assert "0.4 mrad" in words

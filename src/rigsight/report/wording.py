@@ -163,14 +163,9 @@ def _effect_sentence(diagnosis: Diagnosis) -> str:
     if diagnosis.probability < FAMILIES.probable:
         # Nobody would bet on it.
         claim = f"{subject} may be {mainly}{verb} by {cause} (probability {percent(diagnosis.probability)})"
-    elif not diagnosis.ambiguous_with:
-        claim = f"{subject} is {mainly}{verb} by {cause}"
     else:
-        claim = (
-            f"most likely {subject} is {mainly}{verb} by {cause}"
-            if mainly
-            else f"{subject} is most likely {verb} by {cause}"
-        )
+        likely = "most likely " if diagnosis.ambiguous_with else ""
+        claim = f"{likely}{subject} is {mainly}{verb} by {cause}"
     claim = f"{claim[0].upper()}{claim[1:]}"
     if by_motion:
         share = percent(max(own.share for own in diagnosis.families))
