@@ -25,9 +25,10 @@ from rigsight.diagnose.verdict.calibration import Calibration, trained
 from rigsight.effects import AT
 from rigsight_bench.scoring.goals import is_clear
 from rigsight_bench.scoring.probability_scores import ALL, probability_scores, scores_of
-from rigsight_bench.scoring.score import FAILED, Outcome, outcome
+from rigsight_bench.scoring.score import outcome
 from rigsight_bench.scoring.shares import share_of as share_of_trials
 from rigsight_bench.scoring.training_trial import first_model, share_of, training_trial
+from rigsight_bench.scoring.trial_outcome import FAILED, Outcome
 
 FOLDER = Path(__file__).parent / "judged"
 OF_KEY = (

@@ -28,7 +28,7 @@ def test_every_package_but_the_command_line_and_its_pages_has_a_page(
 def test_the_bench_has_a_page(hook: Callable[[str], ModuleType]) -> None:
     reference = hook("reference_pages")
     entries = re.findall(r"^::: (\S+)$", reference.bench_page(), re.MULTILINE)
-    assert {"rigsight_bench.benches", "rigsight_bench.scoring.score.Outcome"} <= set(entries)
+    assert {"rigsight_bench.benches", "rigsight_bench.scoring.trial_outcome.Outcome"} <= set(entries)
     assert all(pkgutil.resolve_name(entry) is not None for entry in entries)
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from rigsight_bench.scoring.probability_scores import log_score
-from rigsight_bench.scoring.score import Outcome
 from rigsight_bench.scoring.shares import mean, mean_interval, median, median_interval, share_of
+from rigsight_bench.scoring.trial_outcome import Outcome
 from rigsight_bench.trials.kinds import TIERS
 
 _LARGE_GAP = TIERS["clear"][0]

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize
 from scipy.special import expit, log_expit, logit
 
-from rigsight_bench.scoring.score import FAILED, Outcome
 from rigsight_bench.scoring.shares import mean, share_of
+from rigsight_bench.scoring.trial_outcome import FAILED, Outcome
 
 ALL = "all"
 LEAST_PROBABILITY = 1e-3

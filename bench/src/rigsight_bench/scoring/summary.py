@@ -13,8 +13,8 @@ import numpy as np
 from rigsight_bench.scoring.goals import figures, laboratory_figures, targets
 from rigsight_bench.scoring.parameter_errors import OF_RIG, ParameterError
 from rigsight_bench.scoring.probability_scores import log_score, probability_scores
-from rigsight_bench.scoring.score import FAILED, Outcome, WithheldError
 from rigsight_bench.scoring.shares import mean, median, quantile, share_of
+from rigsight_bench.scoring.trial_outcome import FAILED, Outcome, WithheldError
 from rigsight_bench.trials.kinds import SEVERAL, Kind
 from rigsight_bench.trials.laboratory.subjects import CONDITIONS
 
