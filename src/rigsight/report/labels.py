@@ -105,16 +105,16 @@ def family_label(own: FamilyAtPlace | ProposedCause) -> str:
 
 
 def forms_label(own: FamilyAtPlace) -> str:
-    """Return the forms of a family with their probabilities within it: ``"Stribeck friction 60 %, Coulomb friction 40 %"``."""
-    return ", ".join(
-        f"{effects_label(form.effects)} {percent(form.probability)}" for form in own.forms[:_FORMS]
-    )
+    """Return the forms of a family with their probabilities, none at 0 %: ``"Stribeck friction 60 %, viscous drag 40 %"``."""
+    shown = ((effects_label(form.effects), percent(form.probability)) for form in own.forms[:_FORMS])
+    return ", ".join(f"{form} {probability}" for form, probability in shown if probability != percent(0.0))
 
 
 def share_label(own: FamilyAtPlace | ProposedCause) -> str:
     """Return the share of the gap of a family with its interval: ``"81 % (74 % to 86 %)"``; below zero it explains nothing."""
+    share = percent(own.share)
     low, high = (percent(max(0.0, end)) for end in own.interval)
-    return f"{percent(own.share)} ({low} to {high})"
+    return share if low == high == share else f"{share} ({low} to {high})"
 
 
 def gap_of_shares(diagnosis: Diagnosis) -> str:

@@ -227,6 +227,6 @@ def _pull(fit: JointFit, scores: Sequence[RecordScore]) -> str:
         return f"The difference is largest for '{worst.record}': {left}."
     name = max(shifts, key=lambda key: abs(shifts[key]))
     return (
-        f"The difference is largest for '{worst.record}': {left}; alone it has {name} = {own.fit.values[name]:.3g} instead of "
-        f"{fit.fit.values[name]:.3g}."
+        f"The difference is largest for '{worst.record}': {left}; a simulation fitted to it alone has "
+        f"{name} = {own.fit.values[name]:.3g} instead of {fit.fit.values[name]:.3g}."
     )
