@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rigsight.units import characteristic_value, parse_dimension, unit_text
+from rigsight.units import behind, characteristic_value, parse_dimension, unit_text
 
 UNITS = {"force": "N m", "x": "rad", "time": "s", "input": "A", "length": "m", "share": "1"}
 
@@ -55,3 +55,7 @@ def test_characteristic_values_obey_the_equation_of_motion() -> None:
     rates = {"force time^2 x^-1": x / t**2, "force time x^-1": x / t, "force x^-1": x, "force x^-3": x**3}
     for dimension, rate in rates.items():
         assert characteristic_value(dimension, scales) * rate == pytest.approx(force, rel=1e-12)
+
+
+def test_a_number_is_followed_by_its_unit_where_it_has_one() -> None:
+    assert [f"2{behind(unit)}" for unit in ("N m", "", "1", "input")] == ["2 N m", "2", "2", "2"]

@@ -42,6 +42,11 @@ def unit_text(dimension: str, units: Mapping[str, str]) -> str:
     return f"{' '.join(above) or '1'}/{denominator}"
 
 
+def behind(unit: str) -> str:
+    """Return a unit as it follows a number, with a space; nothing for a dimensionless one and for what a drive takes."""
+    return "" if unit in ("", DIMENSIONLESS, INPUT_UNIT) else f" {unit}"
+
+
 def at_place(dimension: str, place: str) -> str:
     """Return a dimension whose base quantities are those at a place: ``"force@shaft x@shaft^-1"``."""
     return " ".join(
@@ -53,6 +58,11 @@ def at_place(dimension: str, place: str) -> str:
 def size_of(name: str) -> str:
     """Return the dimension of a number whose size is known by its name alone, see `at_place`."""
     return f"size@{name}"
+
+
+def matters_at(name: str) -> str:
+    """Return the key of the size at which a number matters as much as the largest part of an equation."""
+    return f"matters@{name}"
 
 
 def characteristic_value(dimension: str, scales: Mapping[str, float]) -> float:

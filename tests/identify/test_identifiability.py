@@ -221,6 +221,55 @@ def test_gain_and_inertia_of_a_rig_are_not_both_identifiable(tmp_path: Path) -> 
         )
 
 
+MOTOR = """
+name = "motor"
+summary = "A motor turns its rotor freely; its speed is measured."
+[inputs.u]
+unit = "N m"
+[parameters.J]
+unit = "kg m^2"
+log = true
+[parameters.b]
+unit = "N m s/rad"
+lower = 0.0
+[parameters.tau_off]
+unit = "N m"
+[coordinates.q]
+unit = "rad"
+[energy]
+kinetic = "J*d(q)^2/2"
+[joints.bearing]
+motion = "q"
+damping = "b"
+force = "tau_off"
+[drives.motor]
+signal = "u"
+force = "motor"
+along = "q"
+[sensors.speed]
+reads = "d(q)"
+unit = "rad/s"
+"""
+
+
+def test_a_constant_force_that_is_none_is_determined_beside_the_forces_that_move_the_rig(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "motor.toml").write_text(MOTOR, "utf-8")
+    values, rng = {"J": 0.01, "b": 0.04, "tau_off": 0.0}, np.random.default_rng(5)
+    structure = compose(read_rig_file(tmp_path / "motor.toml"))
+    u = np.repeat(rng.uniform(-0.2, 0.2, 8), 50)
+    clean = simulate(structure, values, Record("steps", 0.02, {"u": u}, {}, hold="zoh"), accuracy=1e-8)
+    record = clean.with_signals(speed=clean["speed"] + 0.1 * rng.standard_normal(u.size))
+    scales = characteristic_scales(structure.rig, [record], values)
+    fit = GreyBoxFit(structure, [record], scales, {"speed": 0.1})
+    result = fit.fit(values, tuple(values))
+    assert result.standard_errors["tau_off"] > 0.5 * abs(result.values["tau_off"])
+    found = identifiability(information(fit, result))
+    assert found.determined == ("J", "b", "tau_off")
+    assert found.relative_errors["tau_off"] < 0.05
+
+
 def test_a_small_part_of_a_sum_is_named_with_the_large_one_it_adds_to() -> None:
     found = said(
         lambda i, m, s: (i + 0.09 * m) * wave(0.3) + (s + 0.3 * m) * wave(0.5, 7.0), i=0.05, m=0.02, s=0.12

@@ -158,14 +158,12 @@ def power(
 
 
 def _sizes_table(found: Power) -> Table:
-    from rigsight.report.labels import effect_label, unit_text
+    from rigsight.report.labels import effect_label
+    from rigsight.units import behind
 
     rows = []
     for size in found.sizes:
-        values = [
-            f"{name} = {value:.3g} {unit_text(unit)}".strip()
-            for name, (value, unit) in size.parameters.items()
-        ]
+        values = [f"{name} = {value:.3g}{behind(unit)}" for name, (value, unit) in size.parameters.items()]
         words = values[0] + (f" (with {', '.join(values[1:])})" if values[1:] else "") if values else ""
         rows.append((effect_label(size.effect), size.where, words or size.reason))
     return table(("Effect", "Where", "Named from"), rows)

@@ -247,14 +247,14 @@ def _difference_summary(found: Difference) -> RenderableType:
     from rich.console import Group
     from rich.markup import escape
 
-    from rigsight.report.labels import unit_text
+    from rigsight.plot.drawing import with_unit
 
     rows = []
     for row in found.rows:
         values = ["" if own is None else f"{own.value:.4g} +/- {own.with_scatter:.2g}" for own in row.values]
         trend = "" if row.trend is None else f" (slope {row.trend.slope:.2g} +/- {row.trend.std:.1g})"
         apart = "" if row.difference != row.difference else f"{row.difference:+.1f}"
-        rows.append((f"{row.name} [{unit_text(row.unit)}]", *values, apart, row.verdict + trend))
+        rows.append((with_unit(row.name, row.unit), *values, apart, row.verdict + trend))
     heads = ("Number", *(unit.name for unit in found.units), "In errors", "")
     return Group(table(heads, rows), escape(found.conclusion))
 

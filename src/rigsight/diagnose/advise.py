@@ -88,7 +88,7 @@ def _menu(context: FitContext) -> Iterator[tuple[_Experiment, dict[str, Floats]]
     drives: tuple[tuple[str, _Band, Callable[[float], Floats]], ...] = (
         ("sweep", (slow, fast), lambda a: linear_sweep(t, a, slow, fast)),
         ("slow sine", (slow, slow), lambda a: a * np.sin(slow * t)),
-        ("sine at resonance", (omega, omega), lambda a: a * np.sin(omega * t)),
+        ("sine", (omega, omega), lambda a: a * np.sin(omega * t)),
     )
     if context.rig.is_driven:
         drives += (("step", None, lambda a: step(t, a, 0.1 * float(t[-1]))),)

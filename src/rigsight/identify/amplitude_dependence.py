@@ -12,6 +12,7 @@ from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
 from rigsight.records.record import Record
 from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig
+from rigsight.units import behind
 
 _CHANCE = 1e-3
 """Probability of an equal or larger difference by chance, over all parameters, below which a parameter counts as changing."""
@@ -37,8 +38,8 @@ def amplitude_dependence(
     for part in zip(*parts, strict=True):
         first, *others = [[] if own is None else _determined(own) for own in part]
         names += [name for name in first if all(name in other for other in others)]
-    unit = units.get(compared[0][1][0].source, "")
-    span = f"from {compared[0][0]:.3g} to {compared[-1][0]:.3g} {unit}".rstrip()
+    span_unit = behind(units.get(compared[0][1][0].source, ""))
+    span = f"from {compared[0][0]:.3g} to {compared[-1][0]:.3g}{span_unit}"
     if not names:
         return f"No parameter was found at all amplitudes {span}; nothing can be compared.", ()
     changing, reported = [], []
@@ -47,29 +48,22 @@ def amplitude_dependence(
         if not all(np.isfinite(error) for _, error in means) or _chance(means) >= _CHANCE / len(names):
             continue
         changing.append(name)
+        unit = behind(units.get(name, ""))
         low, high = means[0][0], means[-1][0]
         values = [value for value, _ in means]
         if min(low, high) > min(values) or max(low, high) < max(values):
-            reported.append(
-                f"{name} moves between {min(values):.3g} and {max(values):.3g} {_unit_behind(name, units)}"
-            )
+            reported.append(f"{name} moves between {min(values):.3g} and {max(values):.3g}{unit}")
         else:
             verb = "falls" if high < low else "rises"
-            reported.append(f"{name} {verb} from {low:.3g} to {high:.3g} {_unit_behind(name, units)}")
+            reported.append(f"{name} {verb} from {low:.3g} to {high:.3g}{unit}")
     if not changing:
         text = f"No parameter changes with the amplitude ({span.removeprefix('from ')}) beyond its interval."
         return text + _moving_resonance(compared), ()
     return (
-        f"With amplitudes {span}, {'; '.join(text.strip() for text in reported)}. These changes exceed the confidence intervals, "
+        f"With amplitudes {span}, {'; '.join(reported)}. These changes exceed the confidence intervals, "
         "which indicates a nonlinear effect; 'rigsight diagnose' looks for it."
         + _no_single_inertia(compared, units, changing)
     ), tuple(changing)
-
-
-def _unit_behind(name: str, units: Mapping[str, str]) -> str:
-    """Return the unit as it stands behind a number."""
-    unit = units.get(name, "")
-    return "" if unit == "1" else unit
 
 
 def _no_single_inertia(

@@ -27,6 +27,7 @@ from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig, evaluated
 from rigsight.rigs.reading.dimensions import UnitError, dimension
 from rigsight.simulate import compose
+from rigsight.units import behind
 
 _DRAWS = 3
 """Number of random points at which the equations are compared; different expressions do not agree there by chance."""
@@ -56,7 +57,7 @@ class OpenFactor:
         source = "as given" if self.is_given else "because no value was given"
         return (
             f"No input moves in the records that are fitted: they determine {listed(self.names)}, and every force of an effect, "
-            f"only up to a common factor. {self.held} = {self.value:g} {self.unit} is held, {source}; all others are "
+            f"only up to a common factor. {self.held} = {self.value:g}{behind(self.unit)} is held, {source}; all others are "
             f"proportional to its true value."
         )
 
@@ -172,7 +173,7 @@ def weighed_spring(
     )
     note = (
         f"{stiffness} = 0 stands for no spring. Estimated from windows of {length:.3g} s, "
-        f"{stiffness} is {value:.3g} +/- {std:.2g} {unit} "
+        f"{stiffness} is {value:.3g} +/- {std:.2g}{behind(unit)} "
         f"and leaves {share:.2f} times the error without a spring: {done}."
     )
     return found, note

@@ -16,7 +16,7 @@ from rigsight.identify.fit.derivatives import central_sensitivities, place_of_fi
 from rigsight.identify.fit.fit_data import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.records.record import Floats
-from rigsight.units import characteristic_value
+from rigsight.units import behind, characteristic_value, matters_at
 
 _LARGEST_POWER = 3
 ONE = 0.03
@@ -148,7 +148,12 @@ def information(fit: GreyBoxFit, result: FitResult) -> Information:
     """Return the information of the records of a fit on its parameters."""
     parameters = [p for p in fit.structure.parameters if p.name in result.free]
     values = np.array([result.values[p.name] for p in parameters])
-    scales = np.array([abs(characteristic_value(p.dimension, fit.scales)) for p in parameters])
+    scales = np.array(
+        [
+            fit.scales.get(matters_at(p.name), abs(characteristic_value(p.dimension, fit.scales)))
+            for p in parameters
+        ]
+    )
     names = tuple(p.name for p in parameters)
     model = _Model(fit, result, names)
     noise = np.sqrt(result.cost / max(result.n_samples - len(names), 1)) or 1.0
@@ -257,7 +262,7 @@ class ReachedBound:
     @property
     def sentence(self) -> str:
         """What was found, and what it may mean."""
-        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        unit = behind(self.unit)
         sign = f"the sign of {self.name} or of a signal is wrong, " if self.bound == 0.0 else ""
         return (
             f"{self.name} stops at its {self.side} bound of {self.bound:.3g}{unit}; the records ask for about "

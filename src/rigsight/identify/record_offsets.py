@@ -13,6 +13,7 @@ from rigsight.identify.fit.fit_data import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.records.record import Floats, Record
 from rigsight.simulate import Structure
+from rigsight.units import behind
 
 _CHANCE = 1e-3
 """Probability by chance below which means count as different; with ten outputs this is wrong in one campaign in a hundred."""
@@ -40,10 +41,10 @@ class DifferingMeans:
         """Return the finding in words."""
         lowest, highest = (choose(self.means, key=self.means.__getitem__) for choose in (min, max))
         chance = f"{self.probability:.1g}" if self.probability > _LEAST_TOLD else f"below {_LEAST_TOLD:g}"
+        low, high = (f"{self.means[end]:.3g}{behind(unit)} in '{end}'" for end in (lowest, highest))
         return (
-            f"The mean residual of {self.output} differs between records, from {self.means[lowest]:.3g} {unit} "
-            f"in '{lowest}' to {self.means[highest]:.3g} {unit} in '{highest}': {self.share:.0%} of the whole residual, and more "
-            f"than by chance (probability {chance}), as if the offset of the sensor, or a constant force, "
+            f"The mean residual of {self.output} differs between records, from {low} to {high}: {self.share:.0%} of the whole "
+            f"residual, and more than by chance (probability {chance}), as if the offset of the sensor, or a constant force, "
             "differed from record to record."
         )
 

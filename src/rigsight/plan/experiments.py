@@ -232,7 +232,7 @@ class Bench:
         yield "growing sweep", after_rest(growing * log_sweep(t, 1.0, lowest, highest))
         yield "slow sine", after_rest(np.sin(lowest * t))
         yield "slow triangle", after_rest(sawtooth(lowest * t + 0.5 * np.pi, 0.5))
-        yield "growing sine at resonance", after_rest(growing * np.sin(middle * t))
+        yield "growing sine", after_rest(growing * np.sin(middle * t))
         held = max(1, round(2.0 * math.pi / (middle * dt)))
         for number in range(1, _REALIZATIONS + 1):
             levels = rng.uniform(-1.0, 1.0, n // held + 1)

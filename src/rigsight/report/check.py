@@ -14,7 +14,7 @@ TOLD_WORDS: Mapping[Told, str] = {
     "apart": "told apart by these records",
     "by size": "depends on their size",
     "other motion": "only by another motion",
-    "alike": "alike to 5 %, what laws of real rigs err",
+    "alike": "differ by less than 5 %, the usual error of a law",
 }
 VISIBLE_WORDS: Mapping[Visible, str] = {
     "yes": "",

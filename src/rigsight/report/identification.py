@@ -30,7 +30,6 @@ from rigsight.report.labels import (
     ERRORS_HOLD,
     UNDETERMINED,
     ParameterRow,
-    behind,
     estimate_text,
     gap_percent,
     parameter_row,
@@ -40,6 +39,7 @@ from rigsight.report.labels import (
 from rigsight.report.page import NotebookTable, notebook_html, rendered
 from rigsight.report.terminal import Summary, Writer, pairs, worth_knowing
 from rigsight.simulate.linearization import Linearization
+from rigsight.units import behind
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -120,12 +120,12 @@ def record_rows(found: Identification, records: Sequence[RecordIdentification]) 
         yield [with_unit("amplitude", units[0]), *(f"{record.amplitude:.4g}" for record in records)]
     else:
         sizes = zip(records, units, strict=True)
-        yield ["amplitude", *(f"{record.amplitude:.4g} {unit}".rstrip() for record, unit in sizes)]
+        yield ["amplitude", *(f"{record.amplitude:.4g}{behind(unit)}" for record, unit in sizes)]
     for name in dict.fromkeys(name for record in _by_amplitude(found) for name in record.estimates):
         cells = []
         for record in records:
             value, std = record.estimates.get(name, (math.nan, math.nan))
-            text = plain(written(value, std)) if math.isfinite(std) else f"{value:.3g}"
+            text = plain(written(value, std)) if math.isfinite(std) else "not determined"
             cells.append(text if name in record.estimates else "-")
         yield [with_unit(name, found.units.get(name, "")), *cells]
 

@@ -11,6 +11,7 @@ from rigsight.effects import AT, Effect, kind_of, placed
 from rigsight.metrics import TWO_SIDED
 from rigsight.parameters import Parameter
 from rigsight.rigs import Rig, declared_rig
+from rigsight.units import behind
 
 if TYPE_CHECKING:
     from rigsight.compare import Column
@@ -92,11 +93,6 @@ def percent(share: float) -> str:
     if share > 0.999:
         return "over 99.9 %"
     return f"{100.0 * share:.1f} %" if share > 0.99 else f"{100.0 * share:.0f} %"
-
-
-def unit_text(unit: str) -> str:
-    """Return a unit as it follows a number; an axis calls the unit of its input just that."""
-    return "" if unit in ("input", "1") else unit
 
 
 def family_label(own: FamilyAtPlace | ProposedCause) -> str:
@@ -199,11 +195,6 @@ def plain(number: Written) -> str:
     if not number.exponent:
         return inside
     return f"({inside})e{number.exponent:+d}" if number.std else f"{inside}e{number.exponent:+d}"
-
-
-def behind(unit: str) -> str:
-    """Return a unit as it follows a number; nothing for a dimensionless one."""
-    return "" if unit in ("", "1") else f" {unit}"
 
 
 def estimate_text(estimate: Estimate) -> str:

@@ -12,9 +12,10 @@ from rigsight.diagnose.location.gap_parts import AmplitudePart, BandPart, GapPar
 from rigsight.diagnose.result import Diagnosis
 from rigsight.records.stamps import written_span
 from rigsight.report.figures import PageFigure, page_figure
-from rigsight.report.labels import gap_percent, listed, percent, rig_of, sentence_case, unit_text
+from rigsight.report.labels import gap_percent, listed, percent, rig_of, sentence_case
 from rigsight.report.sections import output_label
 from rigsight.report.wording import stage_names, stages_reported
+from rigsight.units import behind
 
 if TYPE_CHECKING:
     from rigsight.plot import Figure
@@ -212,7 +213,7 @@ def _lacking(states: Sequence[StatePart]) -> str:
     back = [part for part in known if part.v_low + part.v_high <= 0.0]
     unit = known[0].units["force_mean"]
     means = [
-        f"{sum(p.force_mean * p.n_samples for p in half) / sum(p.n_samples for p in half):.3g} {unit} {words}"
+        f"{sum(p.force_mean * p.n_samples for p in half) / sum(p.n_samples for p in half):.3g}{behind(unit)} {words}"
         for half, words in ((forward, "forward"), (back, "backward"))
         if half
     ]
@@ -236,4 +237,4 @@ def _place(part: StatePart, motion: str) -> str:
 
 def _size(part: AmplitudePart) -> str:
     scale = plot.display_scale(part.units["amplitude"], part.amplitude)
-    return f"{part.amplitude * scale.factor:.4g} {unit_text(scale.unit)}".strip()
+    return f"{part.amplitude * scale.factor:.4g}{behind(scale.unit)}"

@@ -29,9 +29,10 @@ from rigsight.records import Record
 from rigsight.records.record import Floats, Hold, Kind
 from rigsight.records.stamps import time_label, time_origin
 from rigsight.report import figures
-from rigsight.report.labels import gap_percent, rig_of, sentence_case, unit_text
+from rigsight.report.labels import gap_percent, rig_of, sentence_case
 from rigsight.report.sections import output_label
 from rigsight.report.wording import stage_names
+from rigsight.units import behind
 
 if TYPE_CHECKING:
     from rigsight.plot import Figure
@@ -173,7 +174,7 @@ def record_facts(diagnosis: Diagnosis, trace: Trace) -> str:
     scale = plot.display_scale(unit, abs(trace.amplitude or 0.0))
     facts = [f"{trace.role} record", trace.kind]
     if trace.amplitude is not None:
-        facts.append(f"amplitude {trace.amplitude * scale.factor:.4g} {unit_text(scale.unit)}".strip())
+        facts.append(f"amplitude {trace.amplitude * scale.factor:.4g}{behind(scale.unit)}")
     length = float(trace.t[-1] - trace.t[0]) if trace.t.size else 0.0
     return ", ".join([*facts, f"{length:.4g} s", f"{trace.t.size} samples"])
 
@@ -325,7 +326,7 @@ def _by_amplitude(
     for amplitude, record in known:
         for response in responses.get(record, ()):
             if response.path == path:
-                label = f"{amplitude:.4g} {unit_text(unit)}".strip()
+                label = f"{amplitude:.4g}{behind(unit)}"
                 again = sum(own.split(" (")[0] == label for own in labels) + 1
                 labels.append(label if again == 1 else f"{label} ({again})")
                 found.append((labels[-1], response))

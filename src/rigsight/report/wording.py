@@ -21,8 +21,8 @@ from rigsight.report.labels import (
     listed,
     percent,
     place_label,
-    unit_text,
 )
+from rigsight.units import behind
 
 _SEPARATES = 1.0
 """RMS difference in standard deviations of the noise below which an experiment does not help."""
@@ -270,7 +270,7 @@ def advice_sentences(diagnosis: Diagnosis) -> list[str]:
     sentences = []
     for advice in diagnosis.advice:
         unit = diagnosis.units.get(advice.source, "")
-        size = f"amplitude {advice.amplitude:.3g} {unit_text(unit)}".strip()
+        size = f"amplitude {advice.amplitude:.3g}{behind(unit)}"
         band = f" on {advice.source}" if several else ""
         if advice.band is not None:
             low, high = advice.band

@@ -18,6 +18,7 @@ from rigsight.records import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import structure_of_fit
 from rigsight.simulate.model import Model
+from rigsight.units import behind
 from rigsight.workflow.campaign.model_file import named_model
 from rigsight.workflow.gating import (
     FALSE_ALARMS,
@@ -220,7 +221,7 @@ def check_text(check: Check) -> str:
 
 def number_text(check: NumberCheck) -> str:
     """Return a changed number in words."""
-    own, unit = check.number, "" if check.number.unit == "1" else f" {check.number.unit}"
+    own, unit = check.number, behind(check.number.unit)
     return (
         f"{own.name} = {own.value:.4g}{unit}: this record asks for {own.change:+.2g}, usually {check.usual:+.2g} +/- "
         f"{check.allowed:.2g}"
@@ -233,7 +234,7 @@ def suspect_text(gate: Gate) -> str:
     if first is None:
         return f"Place: {gate.place}." if gate.place else ""
     at = f" in {first.where}" if first.where else ""
-    unit = "" if first.unit == "1" else f" {first.unit}"
+    unit = behind(first.unit)
     return (
         f"First suspect: {first.what}{at}, {first.before:.4g} -> {first.after:.4g}{unit}, explains {first.share:.0%} of the "
         f"squared gap in '{gate.examined}'. Other changes at this place, such as friction, may look alike; rigsight diagnose "

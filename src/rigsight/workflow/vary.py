@@ -26,6 +26,7 @@ from rigsight.simulate import Structure, simulate
 from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.simulate.linearization import is_linear, linearize
 from rigsight.simulate.model import Model
+from rigsight.units import behind
 from rigsight.workflow.campaign.model_file import named_model
 from rigsight.workflow.run.kernels import prepare_kernels
 from rigsight.workflow.run.progress import Listener, Stage, silent
@@ -356,7 +357,7 @@ def _row(variant: Variant) -> dict[str, Any]:
 
 
 def _curves(variation: Variation) -> list[tuple[str, NDArray[np.complex128], bool]]:
-    unit = "" if variation.parameter.unit in ("", "1") else f" {variation.parameter.unit}"
+    unit = behind(variation.parameter.unit)
     return [
         (
             f"{variation.parameter.name} = {_plain(variant.value)}{unit}",

@@ -37,6 +37,12 @@ def test_the_toml_file_may_be_named_instead_of_its_folder(campaign: Callable[...
         read_campaign(folder)
 
 
+def test_a_measured_file_is_no_campaign(campaign: Callable[..., Path]) -> None:
+    measured = next(campaign().glob("*.csv"))
+    with pytest.raises(InputError, match=rf"{measured.name} is not a campaign\.toml.*rigsight init"):
+        read_campaign(measured)
+
+
 def test_columns_and_dialect_come_from_the_record(tmp_path: Path, write_csv: Callable[..., Path]) -> None:
     t = 0.01 * np.arange(80)
     rows = np.column_stack([t, 1e3 * np.sin(t), np.cos(t)])

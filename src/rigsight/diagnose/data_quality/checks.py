@@ -20,6 +20,7 @@ from rigsight.records.signals import clipping
 from rigsight.records.stamps import written_span, written_stamp
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
+from rigsight.units import behind
 
 
 def data_quality(context: FitContext, records: Sequence[Record], reidentified: FittedModel) -> DataQuality:
@@ -129,7 +130,7 @@ def _clipped(record: Record, name: str, unit: str) -> list[Finding]:
     return [
         Finding(
             "clipping",
-            f"Record {record.name}: {name} is clipped at {level:.4g} {unit} ({count} samples).",
+            f"Record {record.name}: {name} is clipped at {level:.4g}{behind(unit)} ({count} samples).",
             "Record again with a wider range, or leave the record out.",
             record=record.name,
             signal=name,
@@ -153,8 +154,8 @@ def _quantized(record: Record, name: str, unit: str, n_given: int) -> list[Findi
     return [
         Finding(
             "quantization",
-            f"Record {record.name}: {name} moves in steps of {step:.3g} {unit} ({levels.size} levels); rounding alone causes "
-            f"noise of {step / np.sqrt(12.0):.2g} {unit}.",
+            f"Record {record.name}: {name} moves in steps of {step:.3g}{behind(unit)} ({levels.size} levels); rounding alone "
+            f"causes noise of {step / np.sqrt(12.0):.2g}{behind(unit)}.",
             "Record with a finer resolution; smaller errors cannot be resolved.",
             serious=False,
             record=record.name,
@@ -230,7 +231,7 @@ def _jumping(record: Record, name: str, unit: str) -> list[Finding]:
     return [
         Finding(
             "jump",
-            f"Record {record.name}: {name} jumps by about {largest:.3g} {unit} at {reported}"
+            f"Record {record.name}: {name} jumps by about {largest:.3g}{behind(unit)} at {reported}"
             f"{_more(len(places))}; no mass can move like that.",
             "Check for interference or lost counts; repair the samples or leave the record out.",
             record=record.name,

@@ -21,7 +21,7 @@ from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig, evaluated
 from rigsight.simulate import simulate_outputs
 from rigsight.simulate.prescribed_motion import smooth_motion
-from rigsight.units import size_of
+from rigsight.units import matters_at, size_of
 
 _ACCURACY = 1e-4
 """Relative accuracy of the simulation, more than sufficient for sizes."""
@@ -121,6 +121,8 @@ def scales_at_places(rig: Rig, records: Sequence[Record], values: Mapping[str, f
     numbers = equations.parameters(values, records[0])
     for name, number, role in zip(equations.structure.names, numbers, np.min(own_sizes, axis=0), strict=True):
         least = _LEAST_SHARE * role if np.isfinite(role) else 0.0
+        if np.isfinite(role):
+            scales[matters_at(name)] = float(role)
         scales[size_of(name)] = float(max(abs(number), least)) or _UNKNOWN
     return scales
 
@@ -202,7 +204,8 @@ def characteristic_scales(
     ``x`` displacement, ``input``, ``drive`` (force of the drive), ``force`` (of the spring), ``time`` [s] (reciprocal of the
     angular frequency of the motion) and ``length`` (size of the rig's own first state, 1 if there is none), each without a
     place and at every joint, drive, sensor and state (``force@shaft``); for a rig with more than one motion also
-    ``size@NAME`` for each of its parameters, coordinates, rates (``size@d(NAME)``) and states.
+    ``size@NAME`` for each of its parameters, coordinates, rates (``size@d(NAME)``) and states, and ``matters@NAME`` for each
+    parameter: the size at which it matters as much as the largest part of an equation.
     """
     if not rig.has_one_motion:
         return scales_at_places(rig, records, values)

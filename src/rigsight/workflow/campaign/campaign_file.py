@@ -116,6 +116,11 @@ def locate(campaign: Path) -> Path:
     if not campaign.exists():
         raise InputError(f"{campaign} does not exist; name a campaign.toml or the folder that contains it.")
     if not campaign.is_dir():
+        if campaign.suffix.lower() not in {".toml", ""}:
+            raise InputError(
+                f"{campaign.name} is not a campaign.toml. Name that file, or its folder; 'rigsight init {campaign.parent}' makes a "
+                "draft from the measured files there."
+            )
         return campaign
     path = campaign / "campaign.toml"
     if path.is_file():

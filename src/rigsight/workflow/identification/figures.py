@@ -22,6 +22,7 @@ from rigsight.plot import (
     response_grid,
     svg_text,
 )
+from rigsight.units import behind
 
 if TYPE_CHECKING:
     from rigsight.plot import Figure
@@ -130,9 +131,9 @@ def _free_name(stem: str, taken: Iterable[str]) -> str:
 
 
 def _panels(found: RecordIdentification, identification: Identification) -> list[Panel]:
-    unit = identification.units.get(found.source, "")
+    unit = behind(identification.units.get(found.source, ""))
     alone = [r for r in identification.records if math.isclose(r.amplitude, found.amplitude, rel_tol=1e-6)]
-    label = f"{found.amplitude:.3g} {unit}".strip()
+    label = f"{found.amplitude:.3g}{unit}"
     label = label if len(alone) == 1 else f"{label}, {found.record.name}"
     return [
         Panel(f"{path.source} \u2192 {path.response}", path.measured, fitted_curve(path), label)

@@ -16,6 +16,7 @@ from rigsight.identify.identification import JointIdentification, RecordIdentifi
 from rigsight.identify.linear_view import LinearView
 from rigsight.identify.transfer.transfer_function import MISFIT
 from rigsight.records import Record
+from rigsight.units import behind
 
 _TOLERANCE = 0.02
 """Relative tolerance with which an amplitude counts as inside the identified range."""
@@ -143,15 +144,15 @@ def beyond_identified_amplitudes(campaign: Campaign) -> list[str]:
     reported = []
     for record in campaign.validation:
         size, name = amplitude(record)
-        unit = campaign.rig.signal_units[name]
+        unit = behind(campaign.rig.signal_units[name])
         low, high = min(identified.get(name, [size])), max(identified.get(name, [size]))
         if (1.0 - _TOLERANCE) * low <= size <= (1.0 + _TOLERANCE) * high:
             continue
         one = math.isclose(low, high, rel_tol=_TOLERANCE)
-        span = f"{low:.3g} {unit}" if one else f"{low:.3g} to {high:.3g} {unit}"
+        span = f"{low:.3g}{unit}" if one else f"{low:.3g} to {high:.3g}{unit}"
         than = "smaller" if size < low else "larger"
         reported.append(
-            f"Validation record '{record.name}' has an amplitude of {size:.3g} {unit}, {than} than in the fitted records "
+            f"Validation record '{record.name}' has an amplitude of {size:.3g}{unit}, {than} than in the fitted records "
             f"({span}): its score shows how well the model extrapolates, not how well it was identified."
         )
     return reported
