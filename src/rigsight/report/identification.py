@@ -158,12 +158,9 @@ def linear_rows(found: Identification) -> Iterator[tuple[str, str]]:
         at = _constants_text(view)
         for mode in view.modes:
             frequency = estimate_text(Estimate(mode.natural_frequency, mode.frequency_std, "rad/s"))
-            damping = (
-                estimate_text(Estimate(mode.damping_ratio, mode.damping_std, "1"))
-                if math.isfinite(mode.damping_ratio)
-                else "none"
-            )
-            yield f"pole{f' ({at})' if at else ''}", f"{frequency}, damping ratio {damping}"
+            damping = estimate_text(Estimate(mode.damping_ratio, mode.damping_std, "1"))
+            kind = f"damping ratio {damping}" if math.isfinite(mode.damping_ratio) else "free motion"
+            yield f"pole{f' ({at})' if at else ''}", f"{frequency}, {kind}"
 
 
 def _score_text(score: RecordScore) -> str:
