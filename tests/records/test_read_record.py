@@ -128,14 +128,6 @@ def test_free_decay_may_be_scored(write_csv: WriteCsv) -> None:
     assert not record["u"].any()
 
 
-def test_clipped_output_is_a_warning(write_csv: WriteCsv) -> None:
-    t = 0.01 * np.arange(500)
-    rows = np.column_stack([t, np.sin(5 * t), np.clip(np.sin(5 * t), -0.7, 0.7), np.cos(t)])
-    record = read_record(write_csv(rows=rows), INPUTS, OUTPUTS)
-    assert [note.split(":")[0] for note in record.notes] == ["Warning", "Warning"]
-    assert "'psi'" in record.notes[0]
-
-
 def test_a_column_of_no_signal_is_refused(write_csv: WriteCsv) -> None:
     with pytest.raises(
         InputError, match=r"sweep.csv: columns names 'Psi', .* Did you mean 'psi'\? Signals: t, u, psi, y\."

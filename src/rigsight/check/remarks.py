@@ -59,11 +59,15 @@ def remarks(
     linear: Linearization | None,
 ) -> tuple[Remark, ...]:
     """Return what is to be known, the gravest first."""
-    faults = [fault for record in campaign.records for fault in sensor_faults(campaign.rig, record)]
     found = [
-        Remark("fault" if f.serious else "warning", f.sentence, f.remedy, f.record, f.signal)
-        for f in faults
-        if f.kind != "clipping"
+        Remark(
+            "fault" if f.serious and f.kind != "clipping" else "warning",
+            f.sentence,
+            f.remedy,
+            f.record,
+            f.signal,
+        )
+        for f in sensor_faults(campaign.rig, campaign.records)
     ]
     found += _of_reading(campaign)
     found += _noisy_inputs(campaign, records)
@@ -81,7 +85,7 @@ def _of_reading(campaign: Campaign) -> Iterator[Remark]:
         yield Remark("note", note)
     for record in campaign.records:
         for note in record.notes:
-            is_warning = note.startswith(_WARNING) or "clipped" in note
+            is_warning = note.startswith(_WARNING)
             yield Remark("warning" if is_warning else "note", note.removeprefix(_WARNING), record=record.name)
 
 

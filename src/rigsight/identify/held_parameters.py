@@ -144,6 +144,11 @@ def weighed_spring(
         start = {**constants, **linear_start(rig, records, constants, known)}
     except InputError:
         return None
+    # An effect whose numbers are still to be fitted has none to start from.
+    names = compose(rig, modelled).parameter_name
+    modelled = [
+        effect for effect in modelled if all(names(effect, p.name) in given for p in effect.parameters)
+    ]
     start = {**start, **given, stiffness: start[stiffness]} if modelled else start
     motion = rig.motion
     assert motion.inertia is not None
@@ -156,12 +161,15 @@ def weighed_spring(
     }
     problem = GreyBoxFit(structure, windows, characteristic_scales(rig, records, start), sizes)
     free = [p.name for p in rig.parameters if p.name not in known]
+    others = [name for name in free if name != stiffness]
     try:
-        without = problem.fit({**start, stiffness: 0.0}, [n for n in free if n != stiffness])
+        without = problem.fit({**start, stiffness: 0.0}, others)
         fits = [problem.fit({**found, **known}, free) for found in (start, without.values)]
+        sprung = min(fits, key=lambda fit: fit.cost)
+        again = problem.fit({**sprung.values, stiffness: 0.0}, others)
     except SimulationError:
         return None
-    sprung = min(fits, key=lambda fit: fit.cost)
+    without = min(without, again, key=lambda fit: fit.cost)
     value, std = sprung.values[stiffness], sprung.standard_errors[stiffness]
     unit = next(p.unit for p in rig.parameters if p.name == stiffness)
     share = math.sqrt(sprung.cost / max(without.cost, 1e-300))

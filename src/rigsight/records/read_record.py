@@ -26,7 +26,7 @@ from rigsight.records.conditioning import (
 from rigsight.records.record import Floats, Hold, Kind, Record, Role
 from rigsight.records.resampling import Resampled, joined
 from rigsight.records.sensor_signs import between_readings, refuse_codes, unwrapped
-from rigsight.records.signals import clipping, is_constant
+from rigsight.records.signals import is_constant
 
 _DIALECT = ("separator", "decimal", "header", "comment")
 """What may be said of a text."""
@@ -167,8 +167,6 @@ def read_stretches(
             must_move = options.moving_inputs if may_rest else [signal.name for signal in recorded]
             is_step = kind == "step" and not options.moving_inputs
             found += _rest_notes(path, raw, table, recorded, must_move, is_step)
-    # A command stands at its extremes on purpose.
-    found += _clipping_notes(path, {name: v for name, v in raw.items() if name not in beside}, table)
     found += [
         f"{path.name}: {name} = {value:g} was taken as given, and the column '{name}' was not read. Leave it out of inputs to "
         "read the column."
@@ -332,14 +330,4 @@ def _rest_notes(
         )
     return [
         f"{where}: no input changes ({values}); taken as a free motion. Check the column if the rig was driven."
-    ]
-
-
-def _clipping_notes(path: Path, raw: Mapping[str, Floats], table: Columns) -> list[str]:
-    """Report clipped signals."""
-    return [
-        f"Warning: {path.name}, column '{table.labels[signal]}': {signal} looks clipped, {count} samples are exactly at its "
-        f"extreme {level:g}. Check range and saturation of sensor, amplifier or drive."
-        for signal, samples in raw.items()
-        for level, count in clipping(samples)
     ]

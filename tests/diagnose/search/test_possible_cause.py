@@ -20,8 +20,9 @@ from ..conftest import with_numbers
 
 
 def context() -> Any:
-    """What is asked of the records: their duration and the size of their motion."""
-    return SimpleNamespace(records=(SimpleNamespace(duration=20.0),), scales={"x": 1.0, "time": 1.0})
+    """What is asked of the records: their duration, and the size and range of their motion."""
+    scales = {"x": 1.0, "travel": 2.0, "time": 1.0}
+    return SimpleNamespace(records=(SimpleNamespace(duration=20.0),), scales=scales)
 
 
 def test_an_effect_none_of_whose_numbers_the_records_determine_is_undetermined(friction_models) -> None:
@@ -45,7 +46,7 @@ def test_an_effect_that_opens_a_common_factor_is_undetermined_unless_it_is_open_
 @pytest.mark.parametrize(
     ("effect", "values", "beyond"),
     [
-        # Less than one and a half periods of a ripple lie in the motion.
+        # Less than one period of a ripple lies in the motion.
         ("torque_ripple", {"T_sin": 1.0, "T_cos": 0.1, "kappa": 3.0}, True),
         ("torque_ripple", {"T_sin": 1.0, "T_cos": 0.1, "kappa": 6.0}, False),
         ("maxwell_branch", {"k_m": 1.0, "tau_m": 30.0}, True),

@@ -11,6 +11,7 @@ import pytest
 from rigsight.campaign import with_weighed_spring
 from rigsight.diagnose.fit_context import start_values_of
 from rigsight.diagnose.search.horizon import restores, windowing_of
+from rigsight.effects.coulomb_friction import COULOMB_FRICTION
 from rigsight.identify.identification import Identification
 from rigsight.identify.record_identification import EstimationOptions, identify_record
 from rigsight.records import Record
@@ -121,6 +122,14 @@ def test_a_spring_that_is_given_as_absent_is_weighed(tmp_path: Path, k: float, r
     assert ("k" in found.joint.names) == released
     if released:
         assert differs(found, {"k": k})["k"] < 4.0
+
+
+def test_an_absent_spring_is_weighed_without_effects_that_are_still_to_be_fitted(tmp_path: Path) -> None:
+    records = {name: in_a_loop(2.0, 5.0, 0.0, seed=seed) for seed, name in enumerate("ab")}
+    folder = campaign_of(tmp_path, records, "m = 2.0\nk = 0.0")
+    found = run_identify(folder, effects=[COULOMB_FRICTION])
+    assert found.warnings[0].startswith("k = 0 stands for no spring")
+    assert "T_c" in found.joint.names
 
 
 @pytest.mark.parametrize("parameters", slow_but("k = 0.0", of=["k = 0.0", ""]))

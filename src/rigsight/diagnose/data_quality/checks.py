@@ -15,7 +15,7 @@ from rigsight.diagnose.data_quality.offsets_by_record import levels_apart, means
 from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import NOTES
 from rigsight.identify import OFFSETS_MEND
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.records.signals import clipping
 from rigsight.records.stamps import written_span, written_stamp
 from rigsight.rigs import Rig
@@ -27,7 +27,7 @@ def data_quality(context: FitContext, records: Sequence[Record], reidentified: F
     """Check the records before an effect is tried."""
     # A wrong hold that a strong effect hides shows only with that effect in the model, see `with_best_model`.
     timing = input_timing(context, (), reidentified.fit)
-    faults = [finding for record in records for finding in sensor_faults(context.rig, record)]
+    faults = sensor_faults(context.rig, records)
     return DataQuality(
         findings=(
             *levels_apart(context, records),
@@ -89,14 +89,18 @@ def with_best_model(quality: DataQuality, context: FitContext, model: FittedMode
     return replace(quality, findings=(*found, *others))
 
 
-def sensor_faults(rig: Rig, record: Record) -> list[Finding]:
-    """Return what is wrong with the channels of one record."""
+def sensor_faults(rig: Rig, records: Sequence[Record]) -> list[Finding]:
+    """Return what is wrong with the channels of records."""
+    return [finding for record in records for finding in _sensor_faults(rig, record, records)]
+
+
+def _sensor_faults(rig: Rig, record: Record, records: Sequence[Record]) -> list[Finding]:
     found = []
     signals = {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs) if signal.name in record}
     outputs = [signal.name for signal in rig.outputs if signal.name in record]
     smooth = _of_displacement(rig) if rig.is_driven else frozenset()
     for name, unit in signals.items():
-        found += _clipped(record, name, unit)
+        found += _clipped(record, name, unit, [other[name] for other in records if name in other])
     given = max((np.unique(record[s.name]).size for s in rig.inputs if s.name in record), default=0)
     most_levels = given if given <= NOTES.fewest_levels else 0
     for name in outputs:
@@ -126,7 +130,9 @@ def _of_displacement(rig: Rig) -> frozenset[str]:
     )
 
 
-def _clipped(record: Record, name: str, unit: str) -> list[Finding]:
+def _clipped(record: Record, name: str, unit: str, recorded: Sequence[Floats]) -> list[Finding]:
+    # A level that the channel exceeds in another record is none of its range: a servo rests at its target, too.
+    ends = {min(map(np.min, recorded)), max(map(np.max, recorded))}
     return [
         Finding(
             "clipping",
@@ -136,6 +142,7 @@ def _clipped(record: Record, name: str, unit: str) -> list[Finding]:
             signal=name,
         )
         for level, count in clipping(record[name])
+        if level in ends
     ]
 
 

@@ -72,9 +72,9 @@ def has_size_of_zero(model: FittedModel, others: Sequence[FittedModel]) -> bool:
 
 def is_beyond_records(model: FittedModel, context: FitContext) -> bool:
     """Return True if an effect is slower, longer or coarser than the records can show: it is another spring."""
-    # Its wave is longer than the motion, its time constant or period longer than every record [s], or the length over which it
-    # yields beyond its search; or the periods of a tone are too few in each record. A delay must leave the larger part of a
-    # record: before, the reading is what it was at the start, whatever the input.
+    # Its wave is longer than the motion in every record, its time constant or period longer than every record [s], or the length
+    # over which it yields beyond its search; or the periods of a tone are too few in each record. A delay must leave the larger
+    # part of a record: before, the reading is what it was at the start, whatever the input.
     fit, scales = model.fit, context.scales
     duration = max(record.duration for record in context.records)
 
@@ -91,9 +91,9 @@ def is_beyond_records(model: FittedModel, context: FitContext) -> bool:
         if parameter.dimension == "time^-1":
             least = VERDICT.least_periods if parameter.name == str(effect.pulsation) else 1.0
             return value * duration < 2.0 * math.pi * least
-        size = characteristic_value(placed_dimension(effect, parameter.dimension), scales)
         if parameter.name == effect.wave_number:
-            return value < parameter.search[0] * size
+            return value * characteristic_value(placed_dimension(effect, "travel"), scales) < 2.0 * math.pi
+        size = characteristic_value(placed_dimension(effect, parameter.dimension), scales)
         return parameter.dimension == "x" and value > parameter.search[1] * size
 
     return any(

@@ -95,7 +95,7 @@ def scales_at_places(rig: Rig, records: Sequence[Record], values: Mapping[str, f
         for name, samples in found.items():
             signals.setdefault(name, []).append(samples)
     joints = {joint.name: _of_joint(joint.name, signals) for joint in rig.mechanism.joints}
-    first = next(iter(joints.values()), dict.fromkeys(("x", "force", "drive", "time"), _UNKNOWN))
+    first = next(iter(joints.values()), dict.fromkeys(("x", "travel", "force", "drive", "time"), _UNKNOWN))
     sources = [size_of_signal(signals[f"input {s.name}"]) for s in rig.inputs]
     own_states = [f"value {state.name}" for state in rig.mechanism.states]
     length = size_of_signal(signals[own_states[0]]) if own_states else _UNKNOWN
@@ -112,7 +112,8 @@ def scales_at_places(rig: Rig, records: Sequence[Record], values: Mapping[str, f
         key = f"reading@{name}" if name in equations.sensor_names else f"value {name}"
         slope = f"slope@{name}" if name in equations.sensor_names else f"change {name}"
         x = size_of_signal(signals[key])
-        places[name] = {**plain, **_not_zero({"x": x, "time": _over(x, size_about_zero(signals[slope]))})}
+        own = {"x": x, "travel": _travel(signals[key]), "time": _over(x, size_about_zero(signals[slope]))}
+        places[name] = {**plain, **_not_zero(own)}
     scales = dict(plain)
     for place, sizes in places.items():
         scales |= {f"{base}@{place}": size for base, size in sizes.items()}
@@ -175,7 +176,13 @@ def _of_joint(name: str, signals: _Signals) -> dict[str, float]:
     drive = max(size_of_signal(signals[key]) for key in keys if key in signals)
     force = size_of_signal(signals[f"spring@{name}"]) or drive
     time = _over(x, size_about_zero(signals[f"rate@{name}"]))
-    return _not_zero({"x": x, "force": force, "drive": drive, "time": time})
+    travel = _travel(signals[f"motion@{name}"])
+    return _not_zero({"x": x, "travel": travel, "force": force, "drive": drive, "time": time})
+
+
+def _travel(signals: Sequence[Floats]) -> float:
+    """Return the largest range of a signal within one record."""
+    return max(float(np.ptp(signal)) for signal in signals)
 
 
 def _own_sizes(equations: RigEquations, z: Floats, u: Floats, p: Floats, accelerations: Floats) -> Floats:
@@ -201,11 +208,11 @@ def characteristic_scales(
 ) -> dict[str, float]:
     """Return the size of each base quantity of `rigsight.units` in these records, for constants and parameters by name.
 
-    ``x`` displacement, ``input``, ``drive`` (force of the drive), ``force`` (of the spring), ``time`` [s] (reciprocal of the
-    angular frequency of the motion) and ``length`` (size of the rig's own first state, 1 if there is none), each without a
-    place and at every joint, drive, sensor and state (``force@shaft``); for a rig with more than one motion also
-    ``size@NAME`` for each of its parameters, coordinates, rates (``size@d(NAME)``) and states, and ``matters@NAME`` for each
-    parameter: the size at which it matters as much as the largest part of an equation.
+    ``x`` displacement, ``travel`` (its largest range within one record), ``input``, ``drive`` (force of the drive), ``force`` (of
+    the spring), ``time`` [s] (reciprocal of the angular frequency of the motion) and ``length`` (size of the rig's own first
+    state, 1 if there is none), each without a place and at every joint, drive, sensor and state (``force@shaft``); for a rig with
+    more than one motion also ``size@NAME`` for each of its parameters, coordinates, rates (``size@d(NAME)``) and states, and
+    ``matters@NAME`` for each parameter: the size at which it matters as much as the largest part of an equation.
     """
     if not rig.has_one_motion:
         return scales_at_places(rig, records, values)
@@ -215,13 +222,18 @@ def characteristic_scales(
     scales = {**plain, **{f"{base}@{place}": size for place in places for base, size in plain.items()}}
     seen = {output.name: [r[output.name] for r in records if output.name in r] for output in rig.outputs}
     for name in [*seen, *(state.name for state in mechanism.states if state.name not in seen)]:
-        reading = typical_size(seen[name]) if seen.get(name) else plain["x"]
-        scales |= {f"{base}@{name}": size for base, size in {**plain, "x": reading}.items()}
+        own = (
+            {"x": typical_size(seen[name]), "travel": _travel(seen[name]) or _UNKNOWN}
+            if seen.get(name)
+            else {}
+        )
+        scales |= {f"{base}@{name}": size for base, size in {**plain, **own}.items()}
     return scales
 
 
 def _of_one_motion(rig: Rig, records: Sequence[Record], values: Mapping[str, float]) -> dict[str, float]:
-    displacement = typical_size([record[rig.outputs[0].name] for record in records])
+    moved = [record[rig.outputs[0].name] for record in records]
+    displacement = typical_size(moved)
     drives = [record[rig.inputs[0].name] for record in records]
     drive_input, is_driven = typical_size(drives), not all(map(is_constant, drives))
     motion = rig.motion
@@ -236,6 +248,7 @@ def _of_one_motion(rig: Rig, records: Sequence[Record], values: Mapping[str, flo
         length = typical_size(seconds) if seconds else 1.0
     return {
         "x": displacement,
+        "travel": _travel(moved) or _UNKNOWN,
         "input": drive_input,
         # Without a drive, the spring force is the characteristic size of every force.
         "drive": abs(gain) * drive_input if is_driven else float(spring),
@@ -252,6 +265,7 @@ def _prescribed(rig: Rig, records: Sequence[Record]) -> dict[str, float]:
     force = typical_size([r[rig.outputs[0].name] for r in records])
     return {
         "x": displacement,
+        "travel": _travel([x for x, _ in motions]) or _UNKNOWN,
         "force": force,
         "drive": force,
         "time": displacement / velocity,

@@ -118,8 +118,8 @@ def locate(campaign: Path) -> Path:
     if not campaign.is_dir():
         if campaign.suffix.lower() not in {".toml", ""}:
             raise InputError(
-                f"{campaign.name} is not a campaign.toml. Name that file, or its folder; 'rigsight init {campaign.parent}' makes a "
-                "draft from the measured files there."
+                f"{campaign.name} is not a campaign.toml. Name that file, or its folder; 'rigsight init {campaign.parent}' "
+                "makes a draft from the measured files there."
             )
         return campaign
     path = campaign / "campaign.toml"

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rigsight.campaign import Campaign
+from rigsight.diagnose.data_quality.checks import sensor_faults
 from rigsight.identify import OFFSETS_MEND, differing_means
 from rigsight.identify.amplitude_dependence import measured_amplitude
 from rigsight.identify.closed_loop import closed_loop_notes
@@ -40,6 +41,9 @@ def identification_warnings(
     rig = campaign.rig
     reported = list(campaign.notes)
     reported += [f"Record '{r.name}': {note}" for r in campaign.records for note in r.notes]
+    reported += [
+        f"{fault.sentence} {fault.remedy}" for fault in sensor_faults(rig, campaign.records) if fault.serious
+    ]
     used = _OF_EACH_RECORD if rig.has_one_motion else _NOT_OF_ANY_RIG
     reported += closed_loop_notes(campaign.records, rig, used)
     reported += [f"Record '{r.record.name}': {text}" for r in found for text in r.warnings]
