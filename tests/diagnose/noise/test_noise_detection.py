@@ -196,6 +196,20 @@ def test_the_decay_after_a_pulse_is_not_noise(damping_ratio: float) -> None:
     assert floor.std == pytest.approx(SIGMA, rel=0.3)
 
 
+def test_a_decay_of_few_samples_per_period_is_not_noise() -> None:
+    """Its differences from sample to sample are as large as those of noise."""
+    rng = np.random.default_rng(7)
+    omega = float(np.sqrt(STAGE["k"] / STAGE["m"]))
+    dt = 2.0 * np.pi / omega / 8.0
+    u = np.concatenate([linear_sweep(dt * np.arange(600), 4.0, 0.3 * omega, 1.5 * omega), np.zeros(240)])
+    values = {**STAGE, "d": 0.02 * STAGE["m"] * omega}
+    ringing = simulate(compose(AXIS), values, Record(name="r", dt=dt, signals={"u": u}, units={}))["x"]
+    assert np.std(ringing[-120:]) > 3.0 * SIGMA
+    measured = ringing + SIGMA * rng.standard_normal(u.size)
+    floor = floor_of(Record(name="r", dt=dt, signals={"u": u, "x": measured}, units={}))
+    assert floor.std < 2.0 * SIGMA
+
+
 def test_a_drift_is_not_noise() -> None:
     rng = np.random.default_rng(8)
     u = np.concatenate([np.zeros(800), linear_sweep(DT * np.arange(1500), 4.0, 3.0, 50.0)])

@@ -289,9 +289,9 @@ def _quiet_stretches(record: Record, sources: Sequence[str], output: str) -> lis
         trend = abs(float(np.mean(second) - np.mean(first)))
         scatter = float(np.std(np.diff(settled))) / np.sqrt(2.0)
         deviation = float(np.std(settled))
-        # A drift or a decaying oscillation is not noise. A signal as rough as white noise is not an oscillation.
+        # A drift or a decaying oscillation is not noise, one of few samples per period neither, which is as rough as noise.
         steady = trend <= max(3.0 * scatter, deviation) and np.std(first) <= 2.0 * np.std(second) + 1e-300
-        if steady and (deviation <= 3.0 * scatter or not _is_free_motion(settled)):
+        if steady and not _is_free_motion(settled):
             found.append((settled - np.mean(settled), record.dt))
     return found
 
