@@ -240,11 +240,13 @@ class RecordMotion:
 
     def filtered(self, rows: Floats) -> Floats:
         """Return rows (.., n_samples) without what is faster than the motion and, where it drifts, without what is slower."""
-        if rows.shape[-1] < 10 * _ORDER:
-            return rows
-        if self.drifts:
+        if self.drifts and rows.shape[-1] >= 10 * _ORDER:
             rows = sosfiltfilt(self._slow_filter, rows, axis=-1, padtype="even")
-        if self.band >= _HIGHEST:
+        return self.smoothed(rows)
+
+    def smoothed(self, rows: Floats) -> Floats:
+        """Return rows (.., n_samples) without what is faster than the motion."""
+        if rows.shape[-1] < 10 * _ORDER or self.band >= _HIGHEST:
             return rows
         # Mirrored: an odd continuation would turn about the first sample, whose acceleration is the noisiest.
         return np.asarray(sosfiltfilt(self._filter, rows, axis=-1, padtype="even"))

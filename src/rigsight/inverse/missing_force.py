@@ -152,7 +152,8 @@ def forces_along(
     for joint in fit.rig.mechanism.joints:
         forces, sizes, explained = [], [], -float(n_rows)
         for motion in fit.motions:
-            along = motion.filtered(per_force(motion, joint, values))
+            # The direction of a force: that of a motion that drifts is none of its slow part.
+            along = motion.smoothed(per_force(motion, joint, values))
             own = motion.filtered(fit.residual(motion, values))
             size = np.maximum(np.einsum("it,ij,jt->t", along, weight, along), np.finfo(np.float64).tiny)
             pushed = np.einsum("it,ij,jt->t", along, weight, own)

@@ -107,6 +107,8 @@ class Shortlist:
 
     def suspects(self, effects: Sequence[Effect]) -> list[Suspect]:
         """Return the share that each effect explains, in their order."""
+        if not self._responses.can_be_compared:
+            return [Suspect(effect, 0.0) for effect in effects]
         # To first order; for those near the best, pushes are fitted.
         pushes = list(self._context.threads.side_by_side(self._pushes, list(effects)))
         whole = max(float(self._responses.remainder @ self._responses.remainder), np.finfo(np.float64).tiny)
