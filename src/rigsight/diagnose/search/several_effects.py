@@ -30,7 +30,7 @@ from rigsight.diagnose.search.one_more_effect import each_once, part_of, reduced
 from rigsight.diagnose.search.possible_cause import is_beyond_records, leading
 from rigsight.diagnose.search.single_effects import finished, followed, refine
 from rigsight.diagnose.search.together import Together
-from rigsight.diagnose.search.worth_fitting import SingleModels
+from rigsight.diagnose.search.worth_fitting import SingleModels, is_delay_or_lag
 from rigsight.effects import Effect, Family
 from rigsight.inverse import Proposal, ProposedCause, ProposedForm
 from rigsight.simulate import carried_over
@@ -76,6 +76,8 @@ class SeveralEffects:
             rivals = [*self._within_records(others), *models, *larger[:-1], *parts]
             models = self._compared(finished(self.context, model), rivals)
         several = [model for model in models if len(model.effects) > 1]
+        if several and self.proposal is not None:
+            several += self._within_records(self._late_elsewhere(min(several, key=_error)))
         return larger_first(without_repeated_equations(self.context, several), self.singles)
 
     @property
@@ -203,6 +205,16 @@ class SeveralEffects:
         if others:
             of_model = (replaced, model.fit)
             found += with_one_more(self.context, part, others, self.singles, replaced=of_model)
+        return found
+
+    def _late_elsewhere(self, model: FittedModel) -> list[FittedModel]:
+        """Return a model with its delay or lag in another place: what is late there makes all readings behind it late."""
+        found = list[FittedModel]()
+        for late in filter(is_delay_or_lag, model.effects):
+            others = [e for e in self.effects if is_delay_or_lag(e) and self._key(e) != self._key(late)]
+            part = part_of(self.context, model, tuple(e for e in model.effects if e is not late))
+            if others and part.residuals:
+                found += with_one_more(self.context, part, others, self.singles, replaced=(late, model.fit))
         return found
 
     def _with_forms(

@@ -68,8 +68,8 @@ def search_places(context: FitContext, model: FittedModel, effects: Sequence[Eff
     at_places = [effect for effect in effects if context.rig.acts_at(effect) in examined]
     # What is late in one place makes all readings behind it late: fits tell the places apart, if the records do.
     suspected = max(own_shares, key=own_shares.__getitem__, default="")
-    is_late = any(_is_late(effect) for effect in effects if effect.name == suspected)
-    everywhere = [effect for effect in effects if is_late and _is_late(effect)]
+    is_late = any(is_delay_or_lag(effect) for effect in effects if effect.name == suspected)
+    everywhere = [effect for effect in effects if is_late and is_delay_or_lag(effect)]
     first = [e for e in effects if _stands_for_itself(e) or e in at_places or e in everywhere]
     return Search(
         tuple(places),
@@ -93,7 +93,8 @@ def _stands_for_itself(effect: Effect) -> bool:
     return effect.pulsation is not None or effect.wave_number is not None or not effect.is_push
 
 
-def _is_late(effect: Effect) -> bool:
+def is_delay_or_lag(effect: Effect) -> bool:
+    """Return True for a delay or a lag."""
     return effect.family is Family.DELAY_OR_LAG
 
 
@@ -146,6 +147,11 @@ def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]
     if is_shown and is_rich and min(beside, proposal.explained) >= VERDICT.larger_part:
         # No family alone follows the motion: other forms are tried beside the families that explain it together.
         named = proposal.effects
+    if any(map(is_delay_or_lag, named)):
+        # What is late in one place makes all readings behind it late, as in the screening.
+        named += tuple(
+            e for e in effects if is_delay_or_lag(e) and e.name in proposal.judged and e not in named
+        )
     # A weight is a ripple of one period a turn, with one number less.
     rippled = {rig.where(e) for e in named if e.wave_number is not None and e.torque is not None}
     named += tuple(e for e in effects if e.turns_freely and rig.where(e) in rippled and e not in named)
