@@ -31,10 +31,12 @@ from rigsight.identify import FitResult
 from rigsight.metrics import rms
 from rigsight.records.record import Floats, Record
 from rigsight.records.signals import same_signal
+from rigsight.rigs import Rig
 from rigsight.simulate import Structure
 from rigsight.simulate.model import Model
 from rigsight.simulate.printing.notation import latex_equation, text_equation
 from rigsight.simulate.printing.shown import ShownEquation, flat_equations
+from rigsight.units import behind
 
 _DIGITS = 4
 """Significant digits of numbers in an effect's equation; parameters are written as symbols."""
@@ -87,6 +89,8 @@ _NOISY = 0.1
 _MOST_NAMED = 3
 _SAME_RATE = 1e-6
 """Relative difference up to which sample times, computed from time columns, count as equal."""
+_AT_BOUND = 0.1
+"""Distance in standard errors at which a parameter is at a bound."""
 _NEAR = 1.5
 """Factor of the held-out error within which another equation is nearly as good."""
 
@@ -161,11 +165,29 @@ def warnings_of(data: DiscoveryData, stages: Found, terms: Sequence[Term], floor
             f"less: every omitted term is in doubt."
         )
     found += _still_missing(stages)
+    if stages.judged.error_over_noise > BY_NOISE:
+        found += _at_bounds(data.rig, stages.final)
     unknown = [name for name, c in coefficients_of(stages.final).items() if not math.isfinite(c.std)]
     if unknown and data.rig.mechanism.joints[1:]:
         found.append(f"These records do not determine {', '.join(unknown)}.")
     found += [f"{term.name}: {term.doubt}." for term in terms if term.kept and term.doubt]
     return tuple(found)
+
+
+def _at_bounds(rig: Rig, final: FitResult) -> list[str]:
+    """Return a warning about each parameter of the rig at a bound, which the terms may have to make up for."""
+    found = []
+    for p in rig.parameters:
+        for side, bound in (("lower", p.lower), ("upper", p.upper)):
+            if (
+                p.name in final.free
+                and abs(final.values[p.name] - bound) <= _AT_BOUND * final.standard_errors[p.name]
+            ):
+                found.append(
+                    f"{p.name} is at its {side} bound of {bound:.3g}{behind(p.unit)}: terms may stand for a value beyond it. "
+                    "If the rig may have one, as one that is driven by itself, allow it in a rig file of your own."
+                )
+    return found
 
 
 def _still_missing(stages: Found) -> list[str]:

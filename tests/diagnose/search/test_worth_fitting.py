@@ -52,6 +52,17 @@ def test_of_families_that_explain_the_force_only_together_the_forms_that_were_ta
     assert worth.explained == 0.95
 
 
+def test_a_delay_that_is_named_is_fitted_at_every_place() -> None:
+    """What is late in one place makes all readings behind it late."""
+    late = {"input_delay", "actuator_lag", "sensor_delay", "sensor_lag", "time_shift"}
+    both = cause("sensor_delay", 0.5), cause("cubic_stiffness", 0.9)
+    judged = frozenset(effect.name for effect in CATALOGUE)
+    for taken, expected in ((both, late), (both[1:], set())):
+        proposal = Proposal(taken, both[1:], judged, explained=0.95, by_chance=0.01, noise=0.01)
+        kept = {effect.name for effect in worth_fitting(AXIS, proposal, CATALOGUE).named}
+        assert kept & late == expected
+
+
 def test_a_weight_is_fitted_beside_a_ripple() -> None:
     """It is a ripple of one period a turn, at which the motion alone need not show it."""
     assert "gravity_torque" in fitted(cause("torque_ripple", 0.8))
