@@ -100,7 +100,10 @@ class Pushes:
         self._products = [part.T @ part for part in _of_motions(regression)]
         names = [effect.name for effect in self.effects]
         self._effect_of = np.array([names.index(term.effect.name) for term in terms], dtype=np.int64)
-        self._one_sided = [len(term.one_sided) == 1 and term.one_sided[0] for term in terms]
+        # What a limit loses cannot be gained: a dead zone of negative size would be a saturation.
+        self._one_sided = [
+            term.is_given or (len(term.one_sided) == 1 and term.one_sided[0]) for term in terms
+        ]
         pushes = [
             (own, place, coefficients)
             for own, term, place in zip(self._effect_of, terms, self._places, strict=True)
