@@ -21,6 +21,7 @@ from rigsight.app.page_parts import (
     text,
     typed_option,
     watch,
+    with_attributes,
 )
 from rigsight.app.steps import ROBOT_SUFFIXES, Site, campaign_errors, picture_of
 from rigsight.app.workspace import (
@@ -154,9 +155,8 @@ def _picture(site: Site, arguments: Sequence[str] | None) -> None:
     def image() -> None:
         job = jobs.find(site.root, _PICTURE)
         if is_drawn():
-            ui.element("img").props(
-                f'src="{address_of(file)}" alt="Picture of the rig {arguments[1]}"'
-            ).classes("rig")
+            drawn = ui.element("img").classes("rig")
+            with_attributes(drawn, src=address_of(file), alt=f"Picture of the rig {arguments[1]}")
         elif job is not None and not job.is_running and job.arguments == tuple(arguments):
             for message in job.messages():
                 text("p", message, "message")
