@@ -86,6 +86,16 @@ def test_a_change_below_the_usual_gap_shows_in_the_numbers(folder: Path, tmp_pat
     assert "k" in {own["name"] for own in found["numbers"] if own["closed"]}
 
 
+def test_what_reading_noted_of_a_record_is_told(folder: Path, tmp_path: Path, run: Run) -> None:
+    rows = np.loadtxt(folder / "true.csv", delimiter=",", skiprows=1)[:, [0, 2]]
+    np.savetxt(tmp_path / "undriven.csv", rows, delimiter=",", header="t,x", comments="")
+    base = ["gate", folder / "model.json", tmp_path / "undriven.csv", "--campaign", folder / "known"]
+    code, out, _ = run(*base, "--out", tmp_path)
+    told = "undriven.csv: has no column for u; taken as 0 throughout, because nothing drives the rig."
+    assert json.loads((tmp_path / "gate.json").read_text())["notes"][0] == told
+    assert (code, told in " ".join(out.split())) == (1, True)
+
+
 def test_limits_that_are_asked_for_replace_the_usual_one(folder: Path, tmp_path: Path) -> None:
     gap = of_gate(folder, ["soft.csv"], tmp_path, floors=1e4)["checks"][0]
     assert not gap["closed"]

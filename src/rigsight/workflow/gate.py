@@ -188,6 +188,7 @@ def gate_of(
     checks, numbers = list[Check](), list[NumberCheck]()
     failures, notes = dict[str, str](), list[str]()
     for record in records:
+        notes += [own if own.startswith(record.name) else f"{record.name}: {own}" for own in record.notes]
         try:
             run = free_run(model, record, reference.windows(record), reference.floors)
         except SimulationError as error:
