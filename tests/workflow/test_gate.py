@@ -164,6 +164,10 @@ def test_files_are_read_as_the_campaign_reads_its_own(folder: Path, tmp_path: Pa
         (["true.csv", "--limit", "x=1 kg"], "Write it in m"),
         (["true.csv", "--limit", "x"], "SENSOR=VALUE UNIT"),
         (["true.csv", "--limit", "x=wide"], "not a number"),
+        (
+            ["true.csv", "--limit", "x=1 m", "--limit", "x=1 um"],
+            "--limit 'x=1 um': 'x' is limited twice; give one value.",
+        ),
         (["true.csv", "--campaign", "gone"], "gone does not exist"),
         (["model.json", "--floors", "3"], "model.json"),
     ],

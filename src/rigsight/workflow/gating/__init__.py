@@ -202,7 +202,13 @@ class Limits:
         """Return limits from what was written on a command line: ``psi=0.002 rad``."""
         if floors is not None and not (math.isfinite(floors) and floors > 0.0):
             raise InputError(f"--floors must be a positive number, got {floors:g}.")
-        return cls(floors, dict(_limit(text, rig) for text in texts))
+        limits = dict[str, float]()
+        for text in texts:
+            output, value = _limit(text, rig)
+            if output in limits:
+                raise InputError(f"--limit '{text}': '{output}' is limited twice; give one value.")
+            limits[output] = value
+        return cls(floors, limits)
 
     def asked(self, output: str, floor: float) -> float | None:
         """Return the limit that was asked for; None if there is none."""
