@@ -78,6 +78,11 @@ def test_a_true_record_passes_and_a_changed_one_is_refused_with_its_place(
     assert suite.attrib["failures"] == "2"
 
 
+def test_the_xml_does_not_replace_the_results(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"gate\.json is a file that this run reads or writes"):
+        of_gate(folder, ["true.csv"], tmp_path, floors=3.0, junit=tmp_path / "gate.json")
+
+
 def test_a_change_below_the_usual_gap_shows_in_the_numbers(folder: Path, tmp_path: Path) -> None:
     write_record(folder / "softer.csv", 12, k=797.0)
     found = of_gate(folder, ["softer.csv"], tmp_path, campaign=folder / "known")
@@ -101,8 +106,8 @@ def test_limits_that_are_asked_for_replace_the_usual_one(folder: Path, tmp_path:
     assert not gap["closed"]
     assert gap["gap_in_floors"] == pytest.approx(gap["gap"] / gap["noise_floor"])
     micrometers = 1e6 * gap["gap"]
-    for factor, closed in ((1.01, False), (0.99, True)):
-        asked = [f"x = {factor * micrometers} um"]
+    for factor, blank, closed in ((1.01, " ", False), (0.99, "", True)):
+        asked = [f"x = {factor * micrometers:e}{blank}um"]
         found = of_gate(folder, ["soft.csv"], tmp_path, limits=asked, campaign=folder / "known")
         assert found["closed"] is closed
         assert found["checks"][0]["p_value"] is None
@@ -168,6 +173,8 @@ def test_files_are_read_as_the_campaign_reads_its_own(folder: Path, tmp_path: Pa
             ["true.csv", "--limit", "x=1 m", "--limit", "x=1 um"],
             "--limit 'x=1 um': 'x' is limited twice; give one value.",
         ),
+        (["true.csv", "--limit", "x=1,5 mm"], "'1,5' is not a number"),
+        (["true.csv", "--floors", "3", "--junit", "true.csv"], "another name"),
         (["true.csv", "--campaign", "gone"], "gone does not exist"),
         (["model.json", "--floors", "3"], "model.json"),
     ],

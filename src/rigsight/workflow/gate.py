@@ -149,6 +149,11 @@ def run_gate(
     if out is not None:
         check_writable(Path(out), GATE_FILE)
     if junit is not None:
+        own = [Path(model), *map(Path, records), *([] if out is None else [Path(out) / GATE_FILE])]
+        if junit.resolve() in {file.resolve() for file in own}:
+            raise InputError(
+                f"--junit {junit} is a file that this run reads or writes. Give the XML another name."
+            )
         check_target(junit)
     read = named_model(model, own_effects, own_rigs)
     asked = Limits.read(floors, limits, read.structure.rig)

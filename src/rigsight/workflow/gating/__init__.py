@@ -45,7 +45,9 @@ _OF_GAPS = 0.5
 """Share of it for gaps; the rest is for changed numbers."""
 _FARTHER = 0.1
 """Share by which noise and another draw of the same input may move a sensor farther."""
-_LIMIT = re.compile(r"(?P<output>[^=]+)=\s*(?P<value>[^\s]+)\s*(?P<unit>.*)")
+_LIMIT = re.compile(
+    r"(?P<output>[^=]+)=\s*(?P<value>[-+]?[\d.]+(?:[eE][-+]?\d+)?(?![\d,._])|\S+)\s*(?P<unit>.*)"
+)
 _OF_ITS_OWN = {"name": None, "start": None, "end": None, "amplitude": None, "role": "validation"}
 """What the first record of a campaign says of itself and not of others."""
 
