@@ -91,6 +91,15 @@ def test_a_change_below_the_usual_gap_shows_in_the_numbers(folder: Path, tmp_pat
     assert "k" in {own["name"] for own in found["numbers"] if own["closed"]}
 
 
+def test_a_record_at_rest_passes_without_a_number(folder: Path, tmp_path: Path) -> None:
+    x = np.random.default_rng(20).normal(0.0, 3e-4, 1000)
+    rows = np.column_stack([0.01 * np.arange(1000), np.zeros(1000), x])
+    np.savetxt(tmp_path / "rest.csv", rows, delimiter=",", header="t,u,x", comments="")
+    found = of_gate(folder, [str(tmp_path / "rest.csv")], tmp_path, campaign=folder / "known")
+    assert (found["closed"], found["numbers"], found["suspects"]) == (False, [], [])
+    assert any("nothing moves more than its noise" in note for note in found["notes"])
+
+
 def test_what_reading_noted_of_a_record_is_told(folder: Path, tmp_path: Path, run: Run) -> None:
     rows = np.loadtxt(folder / "true.csv", delimiter=",", skiprows=1)[:, [0, 2]]
     np.savetxt(tmp_path / "undriven.csv", rows, delimiter=",", header="t,x", comments="")

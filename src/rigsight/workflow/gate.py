@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from rigsight.compare import NumberCheck, Suspect, UsualGap, free_run, suspects
+from rigsight.compare import NumberCheck, Suspect, UsualGap, free_run, is_at_rest, suspects
 from rigsight.compare.on_one_record import FreeRun
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.effects import Effect
@@ -204,6 +204,11 @@ def gate_of(
             checks += [check for check in found if check is not None]
             numbers += number_checks(model, record, limits, reference, len(records))
             notes += _notes(record, run, found)
+            if is_at_rest(reference.windows(record), reference.floors):
+                notes.append(
+                    f"{record.name}: nothing moves more than its noise, so numbers are not compared; this record cannot show "
+                    "that one has changed."
+                )
         stage.finished(record.name)
     gate = Gate(rig.name, tuple(checks), tuple(numbers), "", (), failures, tuple(notes))
     excess = [(own.excess, own.record) for own in checks] + [(own.excess, own.record) for own in numbers]

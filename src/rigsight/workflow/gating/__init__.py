@@ -148,7 +148,7 @@ def of_records(model: Model, records: Sequence[Record], are_known: bool) -> Refe
         for gap in known_gaps(record, free_run(model, record, reference.windows(record), floors))
     ]
     numbers = [own_numbers(model, reference.windows(record), floors) for record in records]
-    return Reference(floors, tuple(known), tuple(map(tuple, numbers)), reference.window)
+    return Reference(floors, tuple(known), tuple(tuple(own) for own in numbers if own), reference.window)
 
 
 def known_gaps(record: Record, run: FreeRun) -> list[KnownGap]:
