@@ -128,16 +128,16 @@ def _choice(site: Site) -> None:
 def picture_arguments(
     root: Path, *, model: str | None = None, file: str | None = None
 ) -> tuple[str, ...] | None:
-    """Return the arguments that draw a rig; None if its file does not say a name."""
+    """Return the arguments that draw a rig; None if its name is not known, or would be read as an option."""
+    name = model
     if file is not None:
         try:
             name = tomllib.loads((root / file).read_text(encoding="utf-8")).get("name")
         except (OSError, ValueError):
             return None
-        return (
-            ("rigs", name, "--rigs", file, "--picture", picture_of(file)) if isinstance(name, str) else None
-        )
-    return None if model is None else ("rigs", model, "--picture", picture_of(model))
+    if not isinstance(name, str) or name.startswith("-"):
+        return None
+    return ("rigs", name, *(() if file is None else ("--rigs", file)), "--picture", picture_of(file or name))
 
 
 def _picture(site: Site, arguments: Sequence[str] | None) -> None:
