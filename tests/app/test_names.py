@@ -13,6 +13,7 @@ from nicegui import Client
 from nicegui.page import page
 
 import rigsight.app
+from rigsight.app.campaign_pages import picture_arguments
 from rigsight.app.file_pages import files_page
 from rigsight.app.page_parts import downloads
 from rigsight.app.steps import Site
@@ -30,6 +31,13 @@ def test_a_name_becomes_no_attribute(tmp_path: Path) -> None:
     assert not any("z" in attributes for attributes in found)
     labels = {attributes.get("aria-label") for attributes in found}
     assert labels >= {f"Channels of {EVIL}", f"Remove {EVIL}", f"Download {EVIL}"}
+
+
+def test_a_rig_whose_name_is_an_option_is_not_drawn(tmp_path: Path) -> None:
+    (tmp_path / "rig.toml").write_text('name = "--debug"')
+    assert picture_arguments(tmp_path, file="rig.toml") is None
+    assert picture_arguments(tmp_path, model="--debug") is None
+    assert picture_arguments(tmp_path, model="axis") is not None
 
 
 @pytest.mark.parametrize(
