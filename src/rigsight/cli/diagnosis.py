@@ -134,7 +134,7 @@ def _reproduction_summary(found: Reproduction) -> Group:
     else:
         words = "The same inputs give the same results."
     if found.page_is_as_written is False:
-        words += " But the page of the report was changed after it was written: do not trust what it prints."
+        words += " The page of the report was changed after it was written: do not trust what it prints."
     rows = [(f"version of {name}", *pair) for name, pair in found.versions.items()]
     rows += [(one.key, f"{one.reported}", f"{one.found}") for one in found.differences]
     return Group(words, *([table(("", "Report", "Now"), rows)] if rows else []))
