@@ -14,7 +14,7 @@ import pytest
 pytest.importorskip("psutil", reason="the extra app is not installed")
 
 from rigsight.app import jobs
-from rigsight.app.steps import Site
+from rigsight.app.steps import Site, picture_of
 from rigsight.errors import InputError
 
 
@@ -123,6 +123,15 @@ def test_the_state_of_the_steps_is_the_folder(axis_campaign: Path) -> None:
     assert site.is_outdated("diagnosis/report.html")
     assert done(site) == {"Files", "Rig"}
     assert site.results("diagnosis") == ["diagnosis/report.html"]
+
+
+def test_a_name_with_a_dash_is_no_option(tmp_path: Path) -> None:
+    for name in ("--debug.csv", "a.csv"):
+        (tmp_path / name).write_text("t,u\n" + "".join(f"{0.1 * i},{i % 7}\n" for i in range(60)))
+    jobs.start(tmp_path, "run", Site(tmp_path, ()).inspection("--debug.csv"))
+    assert ended(tmp_path).exit_code == 0
+    assert (tmp_path / picture_of("--debug.csv")).is_file()
+    assert Site(tmp_path, ()).inspection("a.csv")[1] == "a.csv"
 
 
 def test_a_plan_is_for_the_rivals_of_the_diagnosis_once_there_is_one(axis_campaign: Path) -> None:

@@ -115,6 +115,13 @@ def test_only_files_of_the_folder_are_served(folder: Path) -> None:
         assert inside(folder, path) is None
 
 
+def test_a_file_with_the_name_of_the_folder_of_removed_ones_can_be_removed(folder: Path) -> None:
+    upload(folder, "removed", b"1")
+    upload(folder, "a.csv", b"2")
+    assert set_aside(folder, "a.csv") == folder / "removed-2" / "a.csv"
+    assert set_aside(folder, "removed") == folder / "removed-2" / "removed"
+
+
 def test_what_is_removed_is_moved_beside_what_was_removed_before(folder: Path) -> None:
     for content in (b"1", b"2", b"3"):
         upload(folder, "a.csv", content)

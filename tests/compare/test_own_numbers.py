@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -52,6 +54,13 @@ def test_true_records_rarely_ask_for_a_change(known: list) -> None:
     ]
     assert np.mean(np.array(p_values) < 0.05) < 0.08
     assert np.mean(np.array(p_values) < 0.5) > 0.2
+
+
+def test_what_a_record_does_not_determine_is_not_compared(known: list) -> None:
+    own = own_numbers(MODEL, [record(400)], NOISE)
+    faint = [replace(number, information=1e-12 * number.information, change=1e9) for number in own]
+    assert check_numbers("r", faint, known, 0.05) == []
+    assert len(check_numbers("r", own, known, 0.05)) == len(own)
 
 
 def test_windows_add_up(known: list) -> None:

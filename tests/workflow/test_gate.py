@@ -78,6 +78,11 @@ def test_a_true_record_passes_and_a_changed_one_is_refused_with_its_place(
     assert suite.attrib["failures"] == "2"
 
 
+def test_the_xml_does_not_replace_the_results(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"gate\.json is a file that this run reads or writes"):
+        of_gate(folder, ["true.csv"], tmp_path, floors=3.0, junit=tmp_path / "gate.json")
+
+
 def test_a_change_below_the_usual_gap_shows_in_the_numbers(folder: Path, tmp_path: Path) -> None:
     write_record(folder / "softer.csv", 12, k=797.0)
     found = of_gate(folder, ["softer.csv"], tmp_path, campaign=folder / "known")
@@ -86,13 +91,32 @@ def test_a_change_below_the_usual_gap_shows_in_the_numbers(folder: Path, tmp_pat
     assert "k" in {own["name"] for own in found["numbers"] if own["closed"]}
 
 
+def test_a_record_at_rest_passes_without_a_number(folder: Path, tmp_path: Path) -> None:
+    x = np.random.default_rng(20).normal(0.0, 3e-4, 1000)
+    rows = np.column_stack([0.01 * np.arange(1000), np.zeros(1000), x])
+    np.savetxt(tmp_path / "rest.csv", rows, delimiter=",", header="t,u,x", comments="")
+    found = of_gate(folder, [str(tmp_path / "rest.csv")], tmp_path, campaign=folder / "known")
+    assert (found["closed"], found["numbers"], found["suspects"]) == (False, [], [])
+    assert any("nothing moves more than its noise" in note for note in found["notes"])
+
+
+def test_what_reading_noted_of_a_record_is_told(folder: Path, tmp_path: Path, run: Run) -> None:
+    rows = np.loadtxt(folder / "true.csv", delimiter=",", skiprows=1)[:, [0, 2]]
+    np.savetxt(tmp_path / "undriven.csv", rows, delimiter=",", header="t,x", comments="")
+    base = ["gate", folder / "model.json", tmp_path / "undriven.csv", "--campaign", folder / "known"]
+    code, out, _ = run(*base, "--out", tmp_path)
+    told = "undriven.csv: has no column for u; taken as 0 throughout, because nothing drives the rig."
+    assert json.loads((tmp_path / "gate.json").read_text())["notes"][0] == told
+    assert (code, told in " ".join(out.split())) == (1, True)
+
+
 def test_limits_that_are_asked_for_replace_the_usual_one(folder: Path, tmp_path: Path) -> None:
     gap = of_gate(folder, ["soft.csv"], tmp_path, floors=1e4)["checks"][0]
     assert not gap["closed"]
     assert gap["gap_in_floors"] == pytest.approx(gap["gap"] / gap["noise_floor"])
     micrometers = 1e6 * gap["gap"]
-    for factor, closed in ((1.01, False), (0.99, True)):
-        asked = [f"x = {factor * micrometers} um"]
+    for factor, blank, closed in ((1.01, " ", False), (0.99, "", True)):
+        asked = [f"x = {factor * micrometers:e}{blank}um"]
         found = of_gate(folder, ["soft.csv"], tmp_path, limits=asked, campaign=folder / "known")
         assert found["closed"] is closed
         assert found["checks"][0]["p_value"] is None
@@ -154,6 +178,12 @@ def test_files_are_read_as_the_campaign_reads_its_own(folder: Path, tmp_path: Pa
         (["true.csv", "--limit", "x=1 kg"], "Write it in m"),
         (["true.csv", "--limit", "x"], "SENSOR=VALUE UNIT"),
         (["true.csv", "--limit", "x=wide"], "not a number"),
+        (
+            ["true.csv", "--limit", "x=1 m", "--limit", "x=1 um"],
+            "--limit 'x=1 um': 'x' is limited twice; give one value.",
+        ),
+        (["true.csv", "--limit", "x=1,5 mm"], "'1,5' is not a number"),
+        (["true.csv", "--floors", "3", "--junit", "true.csv"], "another name"),
         (["true.csv", "--campaign", "gone"], "gone does not exist"),
         (["model.json", "--floors", "3"], "model.json"),
     ],

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from rigsight.errors import InputError
-from rigsight.workflow.reproduce import read_origin, run_reproduce
+from rigsight.workflow.reproduce import read_origin, run_reproduce, sealed
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -26,7 +26,11 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def report(made: Path, command: str = "rigsight diagnose campaign.toml -o out --seed 3") -> Path:
+def report(
+    made: Path,
+    command: str = "rigsight diagnose campaign.toml -o out --seed 3",
+    results: object = {"verdict": "effect", "probability": 0.9},
+) -> Path:
     digest = hashlib.sha256((made / "campaign.toml").read_bytes()).hexdigest()
     origin = {
         "command": command,
@@ -34,7 +38,7 @@ def report(made: Path, command: str = "rigsight diagnose campaign.toml -o out --
         "campaign": "../campaign.toml",
         "versions": {"rigsight": "0.0"},
         "inputs": {"campaign.toml": digest},
-        "results": {"verdict": "effect", "probability": 0.9},
+        "results": results,
     }
     page = made / "out/report.html"
     page.write_text(
@@ -67,6 +71,36 @@ def test_another_result_is_a_difference(made: Path, tmp_path: Path) -> None:
     assert json.loads((tmp_path / "again/reproduction.json").read_text())["same"] is False
 
 
+def test_a_parameter_is_the_same_within_its_standard_error(made: Path, tmp_path: Path) -> None:
+    def diagnosed(value: float) -> Callable[..., None]:
+        model = {"effects": ["play"], "where": ["x"], "parameters": {"k": {"value": value, "std": 0.1}}}
+        content = {"verdict": "effect", "effects": ["play"], "where": ["x"], "candidates": [model]}
+        return lambda arguments, folder: (
+            (tmp_path / "again").mkdir(exist_ok=True),
+            (tmp_path / "again/diagnosis.json").write_text(json.dumps(content)),
+        )
+
+    results = {"verdict": "effect", "parameters": {"k": {"value": 5.0, "std": 0.1}}}
+    page = report(made, results=results)
+    assert run_reproduce(page, tmp_path / "again", diagnosed(5.0001)).is_same
+    differences = run_reproduce(page, tmp_path / "again", diagnosed(5.01)).differences
+    assert [(one.key, one.reported, one.found) for one in differences] == [("parameters.k", 5.0, 5.01)]
+
+
+def test_a_page_that_was_changed_by_hand_is_known(made: Path, tmp_path: Path) -> None:
+    page = report(made)
+    found = run_reproduce(page, tmp_path / "again", answering(0.9, []))
+    assert (found.page_is_as_written, found.is_same) == (None, True)
+    page.write_text(
+        sealed(page.read_text().replace("<head>", '<head><meta name="rigsight-page" content="">'))
+    )
+    found = run_reproduce(page, tmp_path / "again", answering(0.9, []))
+    assert (found.page_is_as_written, found.is_same) == (True, True)
+    page.write_text(page.read_text().replace("</html>", "quadratic damping</html>"))
+    found = run_reproduce(page, tmp_path / "again", answering(0.9, []))
+    assert (found.page_is_as_written, found.is_same, found.differences) == (False, False, ())
+
+
 def test_with_a_changed_input_nothing_runs(made: Path, tmp_path: Path) -> None:
     moved = tmp_path / "moved"
     page = report(made)
@@ -75,6 +109,7 @@ def test_with_a_changed_input_nothing_runs(made: Path, tmp_path: Path) -> None:
     asked: list[list[str]] = []
     found = run_reproduce(moved / page.relative_to(made), tmp_path / "again", answering(0.9, asked))
     assert found.changed_inputs == ("campaign.toml",)
+    assert found.folder == str(moved)
     assert not found.is_same
     assert not asked
 
@@ -96,7 +131,10 @@ def test_a_page_that_is_no_report_is_refused(tmp_path: Path, run: Run) -> None:
 def test_a_diagnosis_names_its_inputs(axis_campaign: Path, tmp_path: Path, run: Run) -> None:
     arguments = ("-o", tmp_path / "out", "--effect", "cubic_stiffness", "-j", "1", "--by", "A. Engineer")
     assert run("diagnose", axis_campaign, *arguments)[0] == 0
+    page = (tmp_path / "out/report.html").read_text("utf-8")
+    assert sealed(page) == page != sealed(page.replace("cubic", "dry"))
     made = read_origin(tmp_path / "out/report.html")
+    assert made["results"]["parameters"].keys() >= {"m", "d", "k"}
     assert made["by"] == "A. Engineer"
     assert "campaign.toml" in made["inputs"]
     assert all(made["inputs"].values())

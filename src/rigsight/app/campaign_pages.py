@@ -21,6 +21,7 @@ from rigsight.app.page_parts import (
     text,
     typed_option,
     watch,
+    with_attributes,
 )
 from rigsight.app.steps import ROBOT_SUFFIXES, Site, campaign_errors, picture_of
 from rigsight.app.workspace import (
@@ -127,16 +128,16 @@ def _choice(site: Site) -> None:
 def picture_arguments(
     root: Path, *, model: str | None = None, file: str | None = None
 ) -> tuple[str, ...] | None:
-    """Return the arguments that draw a rig; None if its file does not say a name."""
+    """Return the arguments that draw a rig; None if its name is not known, or would be read as an option."""
+    name = model
     if file is not None:
         try:
             name = tomllib.loads((root / file).read_text(encoding="utf-8")).get("name")
         except (OSError, ValueError):
             return None
-        return (
-            ("rigs", name, "--rigs", file, "--picture", picture_of(file)) if isinstance(name, str) else None
-        )
-    return None if model is None else ("rigs", model, "--picture", picture_of(model))
+    if not isinstance(name, str) or name.startswith("-"):
+        return None
+    return ("rigs", name, *(() if file is None else ("--rigs", file)), "--picture", picture_of(file or name))
 
 
 def _picture(site: Site, arguments: Sequence[str] | None) -> None:
@@ -154,9 +155,8 @@ def _picture(site: Site, arguments: Sequence[str] | None) -> None:
     def image() -> None:
         job = jobs.find(site.root, _PICTURE)
         if is_drawn():
-            ui.element("img").props(
-                f'src="{address_of(file)}" alt="Picture of the rig {arguments[1]}"'
-            ).classes("rig")
+            drawn = ui.element("img").classes("rig")
+            with_attributes(drawn, src=address_of(file), alt=f"Picture of the rig {arguments[1]}")
         elif job is not None and not job.is_running and job.arguments == tuple(arguments):
             for message in job.messages():
                 text("p", message, "message")

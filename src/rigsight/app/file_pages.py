@@ -11,7 +11,16 @@ from urllib.parse import quote
 from nicegui import ui
 
 from rigsight.app import jobs
-from rigsight.app.page_parts import address_of, next_step, page_of, run_panel, telling, text, watch
+from rigsight.app.page_parts import (
+    address_of,
+    next_step,
+    page_of,
+    run_panel,
+    telling,
+    text,
+    watch,
+    with_attributes,
+)
 from rigsight.app.steps import OWN_EFFECTS, ROBOT_SUFFIXES, Site, inspection_key, picture_of
 from rigsight.app.workspace import inside, set_aside
 from rigsight.records.formats.known import LARGEST_FILE
@@ -83,11 +92,13 @@ def _file_row(site: Site, name: str, size: int) -> None:
         text("td", f"{size / 1e3:,.1f} kB", "number")
         with ui.element("td"):
             if (suffix := Path(name).suffix.lower()) in MEASURED_SUFFIXES:
-                ui.link("Channels", f"/file?name={quote(name)}").props(f'aria-label="Channels of {name}"')
+                link = ui.link("Channels", f"/file?name={quote(name)}")
+                with_attributes(link, aria_label=f"Channels of {name}")
             else:
                 text("span", _FURTHER.get(suffix, _OTHER))
         with ui.element("td"):
-            ui.button("Remove", on_click=remove).props(f'flat dense no-caps aria-label="Remove {name}"')
+            button = ui.button("Remove", on_click=remove).props("flat dense no-caps")
+            with_attributes(button, aria_label=f"Remove {name}")
 
 
 def _row(tag: str, cells: tuple[str, ...], numbers: Container[int] = ()) -> None:
@@ -142,9 +153,8 @@ def _channels(site: Site, name: str, found: dict[str, Any]) -> None:
     for one in found["refused"]:
         text("p", f"No signal: '{one['name']}' {one['reason']}")
     version = (site.root / picture_of(name)).stat().st_mtime_ns
-    ui.element("img").props(
-        f'src="{address_of(picture_of(name))}?{version}" alt="Plots of the channels of {name}"'
-    )
+    source = f"{address_of(picture_of(name))}?{version}"
+    with_attributes(ui.element("img"), src=source, alt=f"Plots of the channels of {name}")
     text("h2", "Its entry in a campaign")
     text(
         "p",

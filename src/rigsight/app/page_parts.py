@@ -34,6 +34,12 @@ def text(tag: str, words: str, classes: str = "") -> TextElement:
     return TextElement(tag=tag, text=words).classes(classes)
 
 
+def with_attributes(element: ui.element, **attributes: str) -> ui.element:
+    """Return an element with attributes whose values may hold any character, as names of files do; `props` would parse them."""
+    element.props.update({name.replace("_", "-"): value for name, value in attributes.items()})
+    return element
+
+
 def address_of(path: str) -> str:
     """Return the address at which a file of the folder is served."""
     return f"/folder/{quote(path)}"
@@ -76,7 +82,7 @@ def page_of(site: Site, current: str, title: str) -> Iterator[None]:
             steps()
             watch(site.steps, steps.refresh)
         with ui.element("main").classes("content").props('tabindex="-1"') as main:
-            skip.props(f'href="#{main.html_id}"')
+            with_attributes(skip, href=f"#{main.html_id}")
             text("h1", title)
             yield
 
@@ -206,7 +212,7 @@ def run_panel(
         if (now := state()) is not None and not now[1]:
             ended()
 
-    with ui.element("section").classes("run").props(f'aria-label="{label}"'):
+    with with_attributes(ui.element("section").classes("run"), aria_label=label):
         command()
         # It stays while the rest is drawn anew: a screen reader tells only what changes in an element that it knows.
         status = text("p", "").props('role="status"')
@@ -270,9 +276,8 @@ def shown_page(site: Site, path: str, title: str) -> None:
         text("p", "The campaign was changed after this result: run it again.", "bad").props('role="status"')
     ui.link("Open it in a window of its own", address_of(path), new_tab=True)
     # Without an origin of its own, what an uploaded file brought into a report cannot reach this server.
-    ui.element("iframe").props(
-        f'src="{address_of(path)}?{file.stat().st_mtime_ns}" title="{title}" sandbox="allow-scripts allow-downloads"'
-    )
+    frame = ui.element("iframe").props('sandbox="allow-scripts allow-downloads"')
+    with_attributes(frame, src=f"{address_of(path)}?{file.stat().st_mtime_ns}", title=title)
 
 
 def downloads(paths: Sequence[str]) -> None:
@@ -283,4 +288,5 @@ def downloads(paths: Sequence[str]) -> None:
     with ui.element("ul").classes("files"):
         for path in paths:
             with ui.element("li"):
-                ui.link(path, address_of(path)).props(f'download aria-label="Download {path}"')
+                link = ui.link(path, address_of(path)).props("download")
+                with_attributes(link, aria_label=f"Download {path}")

@@ -119,7 +119,9 @@ class Site:
 
     def inspection(self, name: str) -> tuple[str, ...]:
         """Return the arguments that describe a file."""
-        return ("inspect", name, "--json", "--picture", picture_of(name))
+        # A name that begins with a dash would be read as an option.
+        file = f"./{name}" if name.startswith("-") else name
+        return ("inspect", file, "--json", "--picture", picture_of(name))
 
     def files(self, *suffixes: str) -> list[str]:
         """Return the names of the files with one of these endings, or of all; without the campaign and hidden ones."""

@@ -152,6 +152,10 @@ def _forget_draft(folder: Path) -> None:
 
 def _moved(source: Path, removed: Path) -> Path:
     number = 1
+    while removed.exists() and not removed.is_dir():  # a file that was given this name
+        number += 1
+        removed = removed.with_name(f"{_REMOVED}-{number}")
+    number = 1
     while (target := removed / f"{source.stem}{'' if number == 1 else f'-{number}'}{source.suffix}").exists():
         number += 1
     try:

@@ -124,12 +124,17 @@ def reproduce(
 def _reproduction_summary(found: Reproduction) -> Group:
     from rich.console import Group
 
-    if found.is_same:
-        words = "The same inputs give the same results."
-    elif found.changed_inputs:
-        words = f"Not run: these inputs are missing or changed: {', '.join(found.changed_inputs)}."
-    else:
+    if found.changed_inputs:
+        words = (
+            f"Not run: these inputs are missing or changed in {found.folder}: {', '.join(found.changed_inputs)}. Keep a report "
+            "in its place beside its campaign."
+        )
+    elif found.differences:
         words = "The same inputs give other results."
+    else:
+        words = "The same inputs give the same results."
+    if found.page_is_as_written is False:
+        words += " The page of the report was changed after it was written: do not trust what it prints."
     rows = [(f"version of {name}", *pair) for name, pair in found.versions.items()]
     rows += [(one.key, f"{one.reported}", f"{one.found}") for one in found.differences]
     return Group(words, *([table(("", "Report", "Now"), rows)] if rows else []))

@@ -15,6 +15,7 @@ from rigsight.compare.own_numbers import NumberCheck as NumberCheck
 from rigsight.compare.own_numbers import OwnNumber as OwnNumber
 from rigsight.compare.own_numbers import Suspect as Suspect
 from rigsight.compare.own_numbers import check_numbers as check_numbers
+from rigsight.compare.own_numbers import is_at_rest as is_at_rest
 from rigsight.compare.own_numbers import own_numbers as own_numbers
 from rigsight.compare.own_numbers import suspects as suspects
 from rigsight.compare.response_error import ResponseError as ResponseError

@@ -44,6 +44,12 @@ _ACCURACY, _TOLERANCE, _EVALUATIONS = 1e-3, 1e-3, 12
 _FARTHER = (0.8, 1.25)
 """Factors on a number from which it is fitted once more where no number explains the larger part of the gap."""
 _EXPLAINED = 0.5
+_NAMED = 0.005
+"""Share of a squared gap from which a number is suspected: less is 0 %."""
+_MOVED = 2.0
+"""RMS of a sensor in noise floors up to which it shows noise alone. What motion is fitted to noise says nothing of a number."""
+_FAINT = 10.0
+"""Factor on the standard error of known records from which a record does not determine what it cannot tell from zero either."""
 
 
 @dataclass(frozen=True)
@@ -84,9 +90,17 @@ class NumberCheck:
         return self.excess > 1.0
 
 
+def is_at_rest(windows: Sequence[Record], noise: Mapping[str, float]) -> bool:
+    """Return whether no sensor of a record moves more than its noise."""
+    held = {name: [window[name] for window in windows if name in window] for name in noise}
+    return all(np.std(np.concatenate(own)) <= _MOVED * noise[name] for name, own in held.items() if own)
+
+
 def own_numbers(model: Model, windows: Sequence[Record], noise: Mapping[str, float]) -> list[OwnNumber]:
     """Return the change of each number that a record asks for; those on which it holds nothing are left out."""
     structure, rig = model.structure, model.structure.rig
+    if is_at_rest(windows, noise):
+        return []
     scales = characteristic_scales(rig, windows, model.values)
     problem = GreyBoxFit(structure, windows, scales, noise)
     fit = problem.fit(model.values, [], finish=False)
@@ -111,16 +125,20 @@ def own_numbers(model: Model, windows: Sequence[Record], noise: Mapping[str, flo
 def check_numbers(
     record: str, own: Sequence[OwnNumber], known: Sequence[Sequence[OwnNumber]], false_alarms: float
 ) -> list[NumberCheck]:
-    """Hold the numbers of a record against those of known records; the probability of a false alarm is that of each."""
+    """Hold the numbers that a record determines against those of known records, each with this probability of a false alarm."""
     found = []
     for number in own:
         alike = [other for numbers in known for other in numbers if other.name == number.name]
         if len(alike) < len(known):
             continue
-        usual = Prediction.of(np.array([o.change for o in alike]), np.array([o.variance for o in alike]))
         # The residual of a changed rig is no measure of its noise.
         noise = float(np.mean([other.noise for other in alike]))
-        variance = noise / number.information + (DEFAULT_ACCURACY * number.value) ** 2
+        unknown = noise / number.information
+        known_at_least = _FAINT**2 * max(other.noise / other.information for other in alike)
+        if unknown > max(number.value**2, known_at_least):
+            continue
+        usual = Prediction.of(np.array([o.change for o in alike]), np.array([o.variance for o in alike]))
+        variance = unknown + (DEFAULT_ACCURACY * number.value) ** 2
         away = abs(number.change - usual.mean)
         allowed = usual.quantile(0.5 * false_alarms, variance) - usual.mean
         p_value = 2.0 * usual.exceeded(usual.mean + away, variance)
@@ -197,7 +215,7 @@ def suspects(
 ) -> list[Suspect]:
     """Return the numbers whose change explains a part of the gap, the one that explains most first."""
     found = [*_of_sensors(model, windows, run, noise), *_of_equations(model, windows, noise)]
-    return sorted((one for one in found if one.share > 0.0), key=lambda one: -one.share)
+    return sorted((one for one in found if one.share >= _NAMED), key=lambda one: -one.share)
 
 
 def place_of(structure: Structure, name: str) -> str:

@@ -30,7 +30,7 @@ from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.check import CHECK_FILE, CHECK_PAGE, check_files, check_of
 from rigsight.workflow.own.own_effects import candidates_of
-from rigsight.workflow.reproduce import origin
+from rigsight.workflow.reproduce import origin, sealed
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels, structures_to_try
 from rigsight.workflow.run.progress import Listener, Stage, Step, report_notes, silent
 from rigsight.workflow.run.results import (
@@ -137,8 +137,8 @@ def result_files(
     return {
         DIAGNOSIS_FILE: json_text(diagnosis.to_json()),
         MODEL_FILE: json_text(diagnosis.model),
-        REPORT_FILE: render_report(
-            diagnosis, command, versions(), seed=seed, own_effects=effects, origin=made_from
+        REPORT_FILE: sealed(
+            render_report(diagnosis, command, versions(), seed=seed, own_effects=effects, origin=made_from)
         ),
     }
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from rigsight.compare import NumberCheck, Suspect, UsualGap, free_run, suspects
+from rigsight.compare import NumberCheck, Suspect, UsualGap, free_run, is_at_rest, suspects
 from rigsight.compare.on_one_record import FreeRun
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.effects import Effect
@@ -149,6 +149,11 @@ def run_gate(
     if out is not None:
         check_writable(Path(out), GATE_FILE)
     if junit is not None:
+        own = [Path(model), *map(Path, records), *([] if out is None else [Path(out) / GATE_FILE])]
+        if junit.resolve() in {file.resolve() for file in own}:
+            raise InputError(
+                f"--junit {junit} is a file that this run reads or writes. Give the XML another name."
+            )
         check_target(junit)
     read = named_model(model, own_effects, own_rigs)
     asked = Limits.read(floors, limits, read.structure.rig)
@@ -188,6 +193,7 @@ def gate_of(
     checks, numbers = list[Check](), list[NumberCheck]()
     failures, notes = dict[str, str](), list[str]()
     for record in records:
+        notes += [own if own.startswith(record.name) else f"{record.name}: {own}" for own in record.notes]
         try:
             run = free_run(model, record, reference.windows(record), reference.floors)
         except SimulationError as error:
@@ -198,6 +204,11 @@ def gate_of(
             checks += [check for check in found if check is not None]
             numbers += number_checks(model, record, limits, reference, len(records))
             notes += _notes(record, run, found)
+            if is_at_rest(reference.windows(record), reference.floors):
+                notes.append(
+                    f"{record.name}: nothing moves more than its noise, so numbers are not compared; this record cannot show "
+                    "that one has changed."
+                )
         stage.finished(record.name)
     gate = Gate(rig.name, tuple(checks), tuple(numbers), "", (), failures, tuple(notes))
     excess = [(own.excess, own.record) for own in checks] + [(own.excess, own.record) for own in numbers]

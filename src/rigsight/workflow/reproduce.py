@@ -9,6 +9,7 @@ import hashlib
 import json
 import math
 import os
+import re
 import shlex
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -32,8 +33,11 @@ _EXECUTES = ("--effects", "--simulator")
 """Options that name a Python file, which a report that somebody sent must not run."""
 _SAME = 1e-6
 """Relative difference of numbers that count as the same: another machine rounds differently."""
+_SAME_ESTIMATE = 1e-2
+"""Difference of parameters in standard errors that count as the same: another machine ends a fit elsewhere in the valley."""
 RESULTS = ("verdict", "effects", "where", "probability", "gap", "families")
-"""Keys of ``diagnosis.json`` that are compared."""
+"""Keys of ``diagnosis.json`` that are compared, beside the parameters."""
+_SEAL = re.compile(r'<meta name="rigsight-page" content="([0-9a-f]*)">')
 
 
 @dataclass(frozen=True)
@@ -52,13 +56,15 @@ class Reproduction:
     command: tuple[str, ...]  # the arguments behind ``rigsight``
     # Files that are not those of the report, or are missing; nothing was run then.
     changed_inputs: tuple[str, ...]
+    folder: str  # in which the inputs were looked for
+    page_is_as_written: bool | None  # None for a report of a version that did not keep its hash
     versions: Mapping[str, tuple[str, str]]  # package -> version of the report and here, where they differ
     differences: tuple[Difference, ...]
 
     @property
     def is_same(self) -> bool:
         """Whether the report can be trusted to say what its inputs say."""
-        return not self.changed_inputs and not self.differences
+        return not self.changed_inputs and not self.differences and self.page_is_as_written is not False
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``reproduction.json``."""
@@ -80,8 +86,12 @@ def run_reproduce(report: Path, out: Path, run: Callable[[Sequence[str], Path], 
     if not changed:
         run([*command, "--out", str(out.resolve())], (folder / made["ran_in"]).resolve())
         found = json.loads((out / DIAGNOSIS_FILE).read_text("utf-8"))
-        differences = tuple(_differences("", made["results"], {key: found[key] for key in made["results"]}))
-    result = Reproduction(tuple(command), changed, apart, differences)
+        again = {**found, "parameters": _parameters(found)}
+        differences = tuple(_differences("", made["results"], {key: again[key] for key in made["results"]}))
+    text = report.read_text("utf-8")
+    seal = _SEAL.search(text)
+    as_written = None if seal is None else seal[1] == _hash(text)
+    result = Reproduction(tuple(command), changed, str(campaign.parent), as_written, apart, differences)
     write_together(out, {REPRODUCTION_FILE: json_text(result.to_json())})
     return result
 
@@ -141,7 +151,10 @@ def _command(report: Path, command: str) -> list[str]:
 
 def _differences(key: str, reported: Any, found: Any) -> Iterator[Difference]:
     """Yield where two results differ by more than rounding."""
-    if isinstance(reported, dict) and isinstance(found, dict):
+    if _is_estimate(reported) and _is_estimate(found):
+        if not abs(reported["value"] - found["value"]) <= _SAME_ESTIMATE * reported["std"]:
+            yield Difference(key, reported["value"], found["value"])
+    elif isinstance(reported, dict) and isinstance(found, dict):
         for name in dict.fromkeys((*reported, *found)):
             yield from _differences(f"{key}.{name}".lstrip("."), reported.get(name), found.get(name))
     elif isinstance(reported, list) and isinstance(found, list) and len(reported) == len(found):
@@ -152,6 +165,10 @@ def _differences(key: str, reported: Any, found: Any) -> Iterator[Difference]:
             yield Difference(key, reported, found)
     elif reported != found:
         yield Difference(key, reported, found)
+
+
+def _is_estimate(one: Any) -> bool:
+    return isinstance(one, dict) and all(isinstance(one.get(key), float | int) for key in ("value", "std"))
 
 
 def origin(
@@ -169,8 +186,28 @@ def origin(
         "by": by,
         "versions": versions(),
         "inputs": digests(campaign.path.resolve().parent, _inputs(campaign.path, campaign.records)),
-        "results": dict(json_data({key: content[key] for key in RESULTS})),
+        "results": dict(
+            json_data({**{key: content[key] for key in RESULTS}, "parameters": _parameters(content)})
+        ),
     }
+
+
+def _parameters(content: Mapping[str, Any]) -> Any:
+    """Return the parameters of the model that a diagnosis chose, by name."""
+    keys = ("effects", "where")
+    chosen = (c for c in content.get("candidates", []) if all(c[key] == content[key] for key in keys))
+    return next((one["parameters"] for one in chosen), None)
+
+
+def sealed(page: str) -> str:
+    """Return a report with the hash of its content, by which a page that was changed by hand is known."""
+    return _SEAL.sub(lambda _: f'<meta name="rigsight-page" content="{_hash(page)}">', page, count=1)
+
+
+def _hash(page: str) -> str:
+    # Mail and version control may end lines in another way.
+    text = "\n".join(_SEAL.sub("", page, count=1).splitlines())
+    return hashlib.sha256(text.encode("utf-8", "backslashreplace")).hexdigest()
 
 
 def digests(folder: Path, names: Iterable[str]) -> dict[str, str]:

@@ -45,7 +45,9 @@ _OF_GAPS = 0.5
 """Share of it for gaps; the rest is for changed numbers."""
 _FARTHER = 0.1
 """Share by which noise and another draw of the same input may move a sensor farther."""
-_LIMIT = re.compile(r"(?P<output>[^=]+)=\s*(?P<value>[^\s]+)\s*(?P<unit>.*)")
+_LIMIT = re.compile(
+    r"(?P<output>[^=]+)=\s*(?P<value>[-+]?[\d.]+(?:[eE][-+]?\d+)?(?![\d,._])|\S+)\s*(?P<unit>.*)"
+)
 _OF_ITS_OWN = {"name": None, "start": None, "end": None, "amplitude": None, "role": "validation"}
 """What the first record of a campaign says of itself and not of others."""
 
@@ -146,7 +148,7 @@ def of_records(model: Model, records: Sequence[Record], are_known: bool) -> Refe
         for gap in known_gaps(record, free_run(model, record, reference.windows(record), floors))
     ]
     numbers = [own_numbers(model, reference.windows(record), floors) for record in records]
-    return Reference(floors, tuple(known), tuple(map(tuple, numbers)), reference.window)
+    return Reference(floors, tuple(known), tuple(tuple(own) for own in numbers if own), reference.window)
 
 
 def known_gaps(record: Record, run: FreeRun) -> list[KnownGap]:
@@ -202,7 +204,13 @@ class Limits:
         """Return limits from what was written on a command line: ``psi=0.002 rad``."""
         if floors is not None and not (math.isfinite(floors) and floors > 0.0):
             raise InputError(f"--floors must be a positive number, got {floors:g}.")
-        return cls(floors, dict(_limit(text, rig) for text in texts))
+        limits = dict[str, float]()
+        for text in texts:
+            output, value = _limit(text, rig)
+            if output in limits:
+                raise InputError(f"--limit '{text}': '{output}' is limited twice; give one value.")
+            limits[output] = value
+        return cls(floors, limits)
 
     def asked(self, output: str, floor: float) -> float | None:
         """Return the limit that was asked for; None if there is none."""
