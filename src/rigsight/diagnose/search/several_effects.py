@@ -215,7 +215,9 @@ class SeveralEffects:
             part = part_of(self.context, model, tuple(e for e in model.effects if e is not late))
             if others and part.residuals:
                 found += with_one_more(self.context, part, others, self.singles, replaced=(late, model.fit))
-        return found
+        # What is tried as a cause is tried without each of its effects, too.
+        of_pairs = [part for one in found if len(one.effects) > 2 for part in self._parts(one)]
+        return [*found, *of_pairs]
 
     def _with_forms(
         self,
