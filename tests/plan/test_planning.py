@@ -16,7 +16,7 @@ from rigsight.errors import InputError
 from rigsight.plan import Named, Plan, plan_experiment, read_limits, read_payloads
 from rigsight.plan.experiments import use_of
 from rigsight.plan.rivals import contest_of
-from rigsight.plan.search import about, posterior
+from rigsight.plan.search import about, posterior, refitted
 from rigsight.plan.usual_sizes import truths_of_usual_size
 from rigsight.records import Record
 from rigsight.records.read_record import ReadingOptions, read_record
@@ -155,6 +155,15 @@ def test_before_records_rivals_have_a_size_and_none_is_more_probable(one_amplitu
         assert (truth.contest.records, truth.weight) == ((), 0.5)
         assert [rival.probability for rival in truth.contest.rivals] == [0.5, 0.5]
         assert truth.drawn(np.random.default_rng(0)).rival.fit.values["d"] > 0.0
+
+
+def test_before_records_no_effect_is_fitted_as_any_other_rival(one_amplitude: Campaign) -> None:
+    truths = truths_of_usual_size(one_amplitude, [Named(()), PAIR[0]], 600, False, lambda _: None)
+    (first,) = one_amplitude.records
+    contest = truths[0].contest
+    for rival in contest.rivals:
+        assert rival.fit.initial_states == ()
+        assert np.isfinite(refitted(contest, rival, first, contest.remainder.errors(first)).against)
 
 
 def test_beside_records_what_laws_err_by_leaves_effects_of_a_usual_size_open(one_amplitude: Campaign) -> None:
