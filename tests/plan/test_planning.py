@@ -20,6 +20,7 @@ from rigsight.plan.search import about, posterior, refitted
 from rigsight.plan.usual_sizes import truths_of_usual_size
 from rigsight.records import Record
 from rigsight.records.read_record import ReadingOptions, read_record
+from rigsight.report.plan import promise
 from rigsight.rigs import AXIS, read_rig_file
 from rigsight.simulate import compose, simulate
 from rigsight.workflow.run.results import csv_text
@@ -115,6 +116,22 @@ def test_the_promise_is_a_probability_that_simulations_keep(plan: Plan) -> None:
     assert plan.rivals[0].probability < plan.promised <= plan.trials.expected <= 0.97
     assert plan.trials.n == 2
     json.dumps(plan.to_json(), allow_nan=False)
+
+
+@pytest.mark.parametrize(
+    ("now", "promised", "decided", "told"),
+    [
+        (0.94, 0.97, 1.0, "Expected probability"),
+        (0.97, 0.97, 1.0, "The records decide between these rivals already."),
+        (0.6, 0.62, 0.0, "No record within these limits tells these rivals apart."),
+        (0.6, 0.9, 0.4, "Expected probability"),
+    ],
+)
+def test_the_promise_says_what_its_numbers_say(
+    plan: Plan, now: float, promised: float, decided: float, told: str
+) -> None:
+    trials = replace(plan.trials, expected=promised, decided=decided)
+    assert promise(replace(plan, now=now, without_noise=1.0, trials=trials)).startswith(told)
 
 
 def test_the_same_seed_gives_the_same_plan(one_amplitude: Campaign, plan: Plan) -> None:
