@@ -12,6 +12,7 @@ from rigsight.campaign import Campaign
 from rigsight.check import Check, check_campaign
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.records import Record
+from rigsight.workflow.campaign.read_campaign import campaign_of_records
 from rigsight.workflow.own.own_effects import candidates_of
 
 from .axis_records import DT, campaign, swept
@@ -73,6 +74,14 @@ def test_the_whole_catalogue_gives_json_without_numbers_that_json_lacks(both_way
 
 def severities(found: Check, signal: str | None) -> list[str]:
     return [remark.severity for remark in found.remarks if remark.signal == signal]
+
+
+def test_a_record_in_another_unit_is_a_warning() -> None:
+    own = campaign(swept(), swept(30.0))
+    records = [own.records[0], own.records[1].with_signals(x=1e3 * own.records[1]["x"])]
+    read = campaign_of_records("axis", own.rig, own.constants, own.given, records, (), "shared")
+    (found,) = (one for one in check(read, ()).remarks if "another unit" in one.sentence)
+    assert (found.severity, found.sentence[:2]) == ("warning", "At")
 
 
 def test_a_noisy_input_is_a_warning_and_a_clean_one_is_not(both_ways: Check) -> None:

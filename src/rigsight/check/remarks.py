@@ -20,7 +20,7 @@ from rigsight.simulate import compose
 from rigsight.simulate.linearization import Linearization
 
 Severity = Literal["fault", "warning", "note"]
-_WARNING = "Warning: "
+WARNING = "Warning: "
 """Before a note of the reading that asks for attention."""
 _NOISY_INPUT = 0.02
 """Noise of an input over its standard deviation from which estimates suffer, most at high frequencies (a convention)."""
@@ -81,12 +81,11 @@ def remarks(
 
 
 def _of_reading(campaign: Campaign) -> Iterator[Remark]:
-    for note in campaign.notes:
-        yield Remark("note", note)
-    for record in campaign.records:
-        for note in record.notes:
-            is_warning = note.startswith(_WARNING)
-            yield Remark("warning" if is_warning else "note", note.removeprefix(_WARNING), record=record.name)
+    notes: list[tuple[str, str | None]] = [(note, None) for note in campaign.notes]
+    notes += [(note, record.name) for record in campaign.records for note in record.notes]
+    for note, record in notes:
+        severity: Severity = "warning" if note.startswith(WARNING) else "note"
+        yield Remark(severity, note.removeprefix(WARNING), record=record)
 
 
 def _noisy_inputs(campaign: Campaign, records: Sequence[CheckedRecord]) -> Iterator[Remark]:
