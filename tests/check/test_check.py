@@ -11,6 +11,7 @@ import pytest
 from rigsight.campaign import Campaign
 from rigsight.check import Check, check_campaign
 from rigsight.effects import CATALOGUE, effect_named
+from rigsight.identify import OFFSETS_MEND
 from rigsight.records import Record
 from rigsight.workflow.campaign.read_campaign import campaign_of_records
 from rigsight.workflow.own.own_effects import candidates_of
@@ -82,6 +83,20 @@ def test_a_record_in_another_unit_is_a_warning() -> None:
     read = campaign_of_records("axis", own.rig, own.constants, own.given, records, (), "shared")
     (found,) = (one for one in check(read, ()).remarks if "another unit" in one.sentence)
     assert (found.severity, found.sentence[:2]) == ("warning", "At")
+
+
+@pytest.mark.parametrize(("zero", "severity"), [(0.004, "warning"), (5.0, "fault")])
+def test_a_sensor_that_was_zeroed_between_records_is_told(zero: float, severity: str) -> None:
+    own = campaign(swept(), swept(30.0))
+    records = (own.records[0], own.records[1].with_signals(x=zero + own.records[1]["x"]))
+    offsets = [
+        one.severity for one in check(replace(own, records=records), ()).remarks if one.remedy == OFFSETS_MEND
+    ]
+    assert offsets == [severity]
+
+
+def test_the_records_of_one_zero_have_no_offsets(both_ways: Check) -> None:
+    assert OFFSETS_MEND not in {one.remedy for one in both_ways.remarks}
 
 
 def test_a_noisy_input_is_a_warning_and_a_clean_one_is_not(both_ways: Check) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,11 +11,16 @@ import numpy as np
 from rigsight.campaign import Campaign
 from rigsight.check.channels import CheckedRecord
 from rigsight.diagnose.data_quality.checks import sensor_faults
+from rigsight.diagnose.data_quality.finding import Finding
+from rigsight.diagnose.data_quality.offsets_by_record import levels_apart
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.noise.detection import NoiseFloor
+from rigsight.identify import OFFSETS_MEND, differing_means
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.records import Record
 from rigsight.records.record import Floats
 from rigsight.records.signals import is_constant, moves_beyond_noise
+from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.simulate.linearization import Linearization
 
@@ -67,7 +72,7 @@ def remarks(
             f.record,
             f.signal,
         )
-        for f in sensor_faults(campaign.rig, campaign.records)
+        for f in (*_levels_apart(campaign), *sensor_faults(campaign.rig, campaign.records))
     ]
     found += _of_reading(campaign)
     found += _noisy_inputs(campaign, records)
@@ -76,8 +81,37 @@ def remarks(
     found += _feedback(campaign, short)
     found += _floors(floors)
     found += _at_bounds(campaign)
+    return by_gravity(found)
+
+
+def by_gravity(found: Iterable[Remark]) -> tuple[Remark, ...]:
+    """Return remarks, the gravest first."""
     order = ("fault", "warning", "note")
     return tuple(sorted(found, key=lambda one: order.index(one.severity)))
+
+
+def with_offsets(
+    found: Sequence[Remark], rig: Rig, records: Sequence[Record], residuals: Sequence[Floats]
+) -> tuple[Remark, ...]:
+    """Return remarks with the sensors whose mean residual of a rough fit, by record or window, differs between records."""
+    units = {signal.name: signal.unit for signal in rig.outputs}
+    differing = differing_means([record.origin for record in records], records, residuals, list(units))
+    # Means that differ by more than the motion are told already.
+    told = {one.signal for one in found if one.remedy == OFFSETS_MEND}
+    offsets = [
+        Remark("warning", one.sentence(units[one.output]), OFFSETS_MEND, signal=one.output)
+        for one in differing
+        if one.output not in told
+    ]
+    return by_gravity([*found, *offsets])
+
+
+def _levels_apart(campaign: Campaign) -> list[Finding]:
+    records, held = campaign.records, frozenset(filter(None, [campaign.absent_spring]))
+    known = {**campaign.constants, **campaign.given}
+    return levels_apart(
+        FitContext(campaign.rig, records, records, records, {}, {}, held, given=known), records
+    )
 
 
 def _of_reading(campaign: Campaign) -> Iterator[Remark]:
