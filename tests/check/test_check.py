@@ -99,6 +99,37 @@ def test_the_records_of_one_zero_have_no_offsets(both_ways: Check) -> None:
     assert OFFSETS_MEND not in {one.remedy for one in both_ways.remarks}
 
 
+def moving_against(found: Check) -> list[str | None]:
+    return [one.record for one in found.remarks if "opposite sign" in one.sentence]
+
+
+@pytest.mark.parametrize("turned", [(), (1,), (0, 1)])
+def test_records_with_a_reversed_signal_are_faults(turned: tuple[int, ...]) -> None:
+    own = campaign(swept(), swept(30.0), effect="coulomb_friction", T_c=2.0)
+    records = [r.with_signals(x=-r["x"]) if i in turned else r for i, r in enumerate(own.records)]
+    validation = replace(records[1], role="validation")
+    found = check(replace(own, records=(records[0], validation)), ())
+    assert moving_against(found) == [own.records[i].name for i in turned]
+
+
+def test_an_unstable_rig_and_a_loop_that_holds_it_have_no_reversed_signal() -> None:
+    own = campaign()
+    unstable = replace(own, parameters={**own.parameters, "k": -30.0, "d": 5.0})
+    assert moving_against(check(replace(unstable, records=(held_by_a_loop(),)), ())) == []
+
+
+def test_a_controller_that_rejects_disturbances_does_not_reverse_a_signal() -> None:
+    own, rng, n = campaign(), np.random.default_rng(0), 4000
+    x, v, u = np.zeros(n), 0.0, np.zeros(n)
+    push = np.convolve(rng.standard_normal(n), np.ones(40) / 40.0, "same")
+    for i in range(1, n):
+        u[i] = -2000.0 * x[i - 1] - 60.0 * v
+        v += DT * (u[i] + 20.0 * push[i] - 12.0 * v - 800.0 * x[i - 1]) / 2.0
+        x[i] = x[i - 1] + DT * v
+    record = Record("held", DT, {"u": u, "x": x + 2e-5 * rng.standard_normal(n)}, {})
+    assert moving_against(check(replace(own, records=(record,)), ())) == []
+
+
 def test_a_noisy_input_is_a_warning_and_a_clean_one_is_not(both_ways: Check) -> None:
     own = campaign()
     rng = np.random.default_rng(3)

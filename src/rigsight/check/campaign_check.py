@@ -129,13 +129,14 @@ def check_campaign(campaign: Campaign, effects: Sequence[Effect], say: Callable[
     rig = campaign.rig
     records = tuple(checked_record(rig, record) for record in campaign.records)
     say(PARTS[0])
-    coarser = _coarser_records(rig, [with_all_inputs(rig, record) for record in campaign.estimation])
+    everything = _coarser_records(rig, [with_all_inputs(rig, record) for record in campaign.records])
+    coarser = tuple(record for record in everything if record.role == "estimation")
     short = liveliest(coarser, rig, _OF_EFFECTS)
     floors = noise_floors(rig, campaign.records, campaign.drifts)
     say(PARTS[1])
     values = _values(replace(campaign, records=coarser))
     linear = _near_rest(campaign, short, values)
-    found = remarks(campaign, short, records, floors, linear)
+    found = remarks(campaign, short, liveliest(everything, rig, _OF_PARAMETERS), records, floors, linear)
     faulty = {(one.record or "", one.signal or "") for one in found if one.severity == "fault"}
     answers = amplitude_dependences(rig, coarser, faulty)
     say(PARTS[2])

@@ -17,10 +17,11 @@ from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.noise.detection import NoiseFloor
 from rigsight.identify import OFFSETS_MEND, differing_means
 from rigsight.identify.closed_loop import closed_loop_notes
+from rigsight.identify.start.linear_start import moves_against
 from rigsight.records import Record
 from rigsight.records.record import Floats
-from rigsight.records.signals import is_constant, moves_beyond_noise
-from rigsight.rigs import Rig
+from rigsight.records.signals import instrument_of, is_constant, moves_beyond_noise
+from rigsight.rigs import Rig, evaluated
 from rigsight.simulate import compose
 from rigsight.simulate.linearization import Linearization
 
@@ -59,11 +60,12 @@ class Remark:
 def remarks(
     campaign: Campaign,
     short: Sequence[Record],
+    long: Sequence[Record],
     records: Sequence[CheckedRecord],
     floors: Sequence[NoiseFloor],
     linear: Linearization | None,
 ) -> tuple[Remark, ...]:
-    """Return what is to be known, the gravest first."""
+    """Return what is to be known, the gravest first; short and long are stretches of the estimation and of all records."""
     found = [
         Remark(
             "fault" if f.serious and f.kind != "clipping" else "warning",
@@ -76,6 +78,7 @@ def remarks(
     ]
     found += _of_reading(campaign)
     found += _noisy_inputs(campaign, records)
+    found += _reversed(campaign, long)
     found += _lasting(campaign)
     found += _unstable(linear)
     found += _feedback(campaign, short)
@@ -138,6 +141,30 @@ def _noisy_inputs(campaign: Campaign, records: Sequence[CheckedRecord]) -> Itera
                     record.name,
                     channel.name,
                 )
+
+
+def _reversed(campaign: Campaign, records: Sequence[Record]) -> Iterator[Remark]:
+    """Yield records that move against their drive: one of the signals has the opposite sign."""
+    rig, known = campaign.rig, {**campaign.constants, **campaign.given}
+    if not (rig.has_one_motion and rig.is_driven) or rig.controllers:
+        return
+    if not {symbol.name for symbol in rig.motion.drive_gain.free_symbols} <= known.keys():
+        return
+    source, response = rig.inputs[0].name, rig.outputs[0].name
+    for record in records:
+        still = response not in record or is_constant(record[source]) or is_constant(record[response])
+        if still or instrument_of(record, rig.signal_units):
+            continue
+        gain = evaluated(rig.motion.drive_gain, {**known, **record.constants})
+        if moves_against(record, source, response, gain, campaign.absent_spring is None):
+            yield Remark(
+                "fault",
+                f"Record {record.name}: {response} moves against {source}, which no rig with these equations does: one of the "
+                "signals has the opposite sign.",
+                f'Change the sign of that signal: {response} = {{ name = "...", scale = -1.0 }}.',
+                record.name,
+                response,
+            )
 
 
 def _driving(campaign: Campaign) -> list[str]:
