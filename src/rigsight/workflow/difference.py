@@ -124,6 +124,12 @@ class Difference:
             if others
             else ""
         ) + scatter
+        lacking = [f"{unit.left} ({unit.name})" for unit in self.units if unit.left]
+        if lacking:
+            besides += (
+                f" The equations leave {', '.join(lacking)}, more than noise: an effect may have changed which they lack. Run "
+                "'rigsight diagnose' on each, and compare the results."
+            )
         if not self.changed:
             return f"No number changed beyond what records of one campaign differ.{besides}"
         names = ", ".join(row.name for row in self.changed)
@@ -230,7 +236,9 @@ def _units(
 
 def _is_campaign(path: Path) -> bool:
     """Return whether a path is a campaign and no folder of a diagnosis."""
-    return path.is_file() or ((path / "campaign.toml").is_file() and not (path / DIAGNOSIS_FILE).is_file())
+    if path.is_file():
+        return path.suffix != ".json"
+    return (path / "campaign.toml").is_file() and not (path / DIAGNOSIS_FILE).is_file()
 
 
 def _rows(units: Sequence[Unit], along: Sequence[float]) -> tuple[Row, ...]:

@@ -22,6 +22,7 @@ from rigsight.identify.identification import Identification
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
 from rigsight.workflow.campaign.model_file import part_of_diagnosis, read_model
+from rigsight.workflow.identification.joint import motion_left
 from rigsight.workflow.run.results import DIAGNOSIS_FILE
 
 _MEND = "Name folders that 'rigsight diagnose' wrote, or campaigns."
@@ -54,6 +55,8 @@ class Unit:
     numbers: Mapping[str, Known]
     units: Mapping[str, str]
     roles: Mapping[str, Role | Family]  # of each number in the equations, the family for one of an effect
+    # What its equations leave of its records beyond noise at the most, in words; empty where nothing is, or for a diagnosis.
+    left: str = ""
 
     @property
     def has_one_record(self) -> bool:
@@ -116,6 +119,10 @@ def refuse_other_rigs(rigs: Mapping[str, str]) -> None:
 def read_unit(folder: Path, own_effects: Iterable[Effect], own_rigs: Iterable[Rig]) -> Unit:
     """Return what a diagnosis found, by its folder."""
     file = folder / DIAGNOSIS_FILE
+    if folder.is_file():
+        raise InputError(
+            f"{folder} is neither a campaign nor a folder: name the folder of the results, {folder.parent}."
+        )
     if not file.is_file():
         raise InputError(f"{folder} contains neither {DIAGNOSIS_FILE} nor campaign.toml. {_MEND}")
     found = part_of_diagnosis(file, _Diagnosis, _MEND)
@@ -171,13 +178,14 @@ def unit_of_records(name: str, campaign: Campaign, identification: Identificatio
         alone = [(k.fit.values[number], k.fit.standard_errors.get(number)) for k in fit.kinds]
         return _known(fit.fit.values[number], fit.fit.standard_errors[number], alone)
 
-    return _unit(
+    unit = _unit(
         name,
         campaign.rig.name,
         compose(campaign.rig, campaign.modelled),
         {number: known(number) for number in joint.names},
         {number: identification.units[number] for number in joint.names},
     )
+    return replace(unit, left=next(iter(motion_left(joint.scores, campaign.estimation)), ""))
 
 
 def with_effects_of(
