@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, TypeVar
@@ -40,6 +40,7 @@ from rigsight.workflow.differing import (
     unit_of_records,
     with_effects_of,
 )
+from rigsight.workflow.identification.joint import motion_left
 from rigsight.workflow.identification.rig import identify_rig
 from rigsight.workflow.run.kernels import checked_jobs
 from rigsight.workflow.run.progress import Listener, silent
@@ -228,9 +229,9 @@ def _units(
         models.append((model.effects, model.values))
     for path, campaign in read.items():
         whole = with_effects_of(campaign, models)
-        found[path] = unit_of_records(
-            str(path), whole, identify_rig(whole, EstimationOptions(), jobs, listener)
-        )
+        identified = identify_rig(whole, EstimationOptions(), jobs, listener)
+        left = motion_left(identified.joint.scores, whole.estimation)
+        found[path] = replace(unit_of_records(str(path), whole, identified), left=next(iter(left), ""))
     return [found[path] for path in paths]
 
 

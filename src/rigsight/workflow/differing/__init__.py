@@ -22,7 +22,6 @@ from rigsight.identify.identification import Identification
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
 from rigsight.workflow.campaign.model_file import part_of_diagnosis, read_model
-from rigsight.workflow.identification.joint import motion_left
 from rigsight.workflow.run.results import DIAGNOSIS_FILE
 
 _MEND = "Name folders that 'rigsight diagnose' wrote, or campaigns."
@@ -178,14 +177,13 @@ def unit_of_records(name: str, campaign: Campaign, identification: Identificatio
         alone = [(k.fit.values[number], k.fit.standard_errors.get(number)) for k in fit.kinds]
         return _known(fit.fit.values[number], fit.fit.standard_errors[number], alone)
 
-    unit = _unit(
+    return _unit(
         name,
         campaign.rig.name,
         compose(campaign.rig, campaign.modelled),
         {number: known(number) for number in joint.names},
         {number: identification.units[number] for number in joint.names},
     )
-    return replace(unit, left=next(iter(motion_left(joint.scores, campaign.estimation)), ""))
 
 
 def with_effects_of(
