@@ -11,7 +11,9 @@ import pytest
 from rigsight.campaign import Campaign
 from rigsight.check import Check, check_campaign
 from rigsight.effects import CATALOGUE, effect_named
+from rigsight.identify import OFFSETS_MEND
 from rigsight.records import Record
+from rigsight.workflow.campaign.read_campaign import campaign_of_records
 from rigsight.workflow.own.own_effects import candidates_of
 
 from .axis_records import DT, campaign, swept
@@ -73,6 +75,59 @@ def test_the_whole_catalogue_gives_json_without_numbers_that_json_lacks(both_way
 
 def severities(found: Check, signal: str | None) -> list[str]:
     return [remark.severity for remark in found.remarks if remark.signal == signal]
+
+
+def test_a_record_in_another_unit_is_a_warning() -> None:
+    own = campaign(swept(), swept(30.0))
+    records = [own.records[0], own.records[1].with_signals(x=1e3 * own.records[1]["x"])]
+    read = campaign_of_records("axis", own.rig, own.constants, own.given, records, (), "shared")
+    (found,) = (one for one in check(read, ()).remarks if "another unit" in one.sentence)
+    assert (found.severity, found.sentence[:2]) == ("warning", "At")
+
+
+@pytest.mark.parametrize(("zero", "severity"), [(0.004, "warning"), (5.0, "fault")])
+def test_a_sensor_that_was_zeroed_between_records_is_told(zero: float, severity: str) -> None:
+    own = campaign(swept(), swept(30.0))
+    records = (own.records[0], own.records[1].with_signals(x=zero + own.records[1]["x"]))
+    offsets = [
+        one.severity for one in check(replace(own, records=records), ()).remarks if one.remedy == OFFSETS_MEND
+    ]
+    assert offsets == [severity]
+
+
+def test_the_records_of_one_zero_have_no_offsets(both_ways: Check) -> None:
+    assert OFFSETS_MEND not in {one.remedy for one in both_ways.remarks}
+
+
+def moving_against(found: Check) -> list[str | None]:
+    return [one.record for one in found.remarks if "opposite sign" in one.sentence]
+
+
+@pytest.mark.parametrize("turned", [(), (1,), (0, 1)])
+def test_records_with_a_reversed_signal_are_faults(turned: tuple[int, ...]) -> None:
+    own = campaign(swept(), swept(30.0), effect="coulomb_friction", T_c=2.0)
+    records = [r.with_signals(x=-r["x"]) if i in turned else r for i, r in enumerate(own.records)]
+    validation = replace(records[1], role="validation")
+    found = check(replace(own, records=(records[0], validation)), ())
+    assert moving_against(found) == [own.records[i].name for i in turned]
+
+
+def test_an_unstable_rig_and_a_loop_that_holds_it_have_no_reversed_signal() -> None:
+    own = campaign()
+    unstable = replace(own, parameters={**own.parameters, "k": -30.0, "d": 5.0})
+    assert moving_against(check(replace(unstable, records=(held_by_a_loop(),)), ())) == []
+
+
+def test_a_controller_that_rejects_disturbances_does_not_reverse_a_signal() -> None:
+    own, rng, n = campaign(), np.random.default_rng(0), 4000
+    x, v, u = np.zeros(n), 0.0, np.zeros(n)
+    push = np.convolve(rng.standard_normal(n), np.ones(40) / 40.0, "same")
+    for i in range(1, n):
+        u[i] = -2000.0 * x[i - 1] - 60.0 * v
+        v += DT * (u[i] + 20.0 * push[i] - 12.0 * v - 800.0 * x[i - 1]) / 2.0
+        x[i] = x[i - 1] + DT * v
+    record = Record("held", DT, {"u": u, "x": x + 2e-5 * rng.standard_normal(n)}, {})
+    assert moving_against(check(replace(own, records=(record,)), ())) == []
 
 
 def test_a_noisy_input_is_a_warning_and_a_clean_one_is_not(both_ways: Check) -> None:

@@ -16,10 +16,11 @@ from rigsight.errors import InputError
 from rigsight.plan import Named, Plan, plan_experiment, read_limits, read_payloads
 from rigsight.plan.experiments import use_of
 from rigsight.plan.rivals import contest_of
-from rigsight.plan.search import about, posterior
+from rigsight.plan.search import about, posterior, refitted
 from rigsight.plan.usual_sizes import truths_of_usual_size
 from rigsight.records import Record
 from rigsight.records.read_record import ReadingOptions, read_record
+from rigsight.report.plan import promise
 from rigsight.rigs import AXIS, read_rig_file
 from rigsight.simulate import compose, simulate
 from rigsight.workflow.run.results import csv_text
@@ -117,6 +118,22 @@ def test_the_promise_is_a_probability_that_simulations_keep(plan: Plan) -> None:
     json.dumps(plan.to_json(), allow_nan=False)
 
 
+@pytest.mark.parametrize(
+    ("now", "promised", "decided", "told"),
+    [
+        (0.94, 0.97, 1.0, "Expected probability"),
+        (0.97, 0.97, 1.0, "The records decide between these rivals already."),
+        (0.6, 0.62, 0.0, "No record within these limits tells these rivals apart."),
+        (0.6, 0.9, 0.4, "Expected probability"),
+    ],
+)
+def test_the_promise_says_what_its_numbers_say(
+    plan: Plan, now: float, promised: float, decided: float, told: str
+) -> None:
+    trials = replace(plan.trials, expected=promised, decided=decided)
+    assert promise(replace(plan, now=now, without_noise=1.0, trials=trials)).startswith(told)
+
+
 def test_the_same_seed_gives_the_same_plan(one_amplitude: Campaign, plan: Plan) -> None:
     again = plan_experiment(one_amplitude, PAIR, read_limits(AXIS, LIMITS), 6.0, 0, lambda _: None, draws=1)
     assert np.array_equal(again.record["u"], plan.record["u"])
@@ -155,6 +172,15 @@ def test_before_records_rivals_have_a_size_and_none_is_more_probable(one_amplitu
         assert (truth.contest.records, truth.weight) == ((), 0.5)
         assert [rival.probability for rival in truth.contest.rivals] == [0.5, 0.5]
         assert truth.drawn(np.random.default_rng(0)).rival.fit.values["d"] > 0.0
+
+
+def test_before_records_no_effect_is_fitted_as_any_other_rival(one_amplitude: Campaign) -> None:
+    truths = truths_of_usual_size(one_amplitude, [Named(()), PAIR[0]], 600, False, lambda _: None)
+    (first,) = one_amplitude.records
+    contest = truths[0].contest
+    for rival in contest.rivals:
+        assert rival.fit.initial_states == ()
+        assert np.isfinite(refitted(contest, rival, first, contest.remainder.errors(first)).against)
 
 
 def test_beside_records_what_laws_err_by_leaves_effects_of_a_usual_size_open(one_amplitude: Campaign) -> None:

@@ -17,6 +17,11 @@ def test_cut_peaks_are_found(level: float) -> None:
     assert found[-level] > 50
 
 
+def test_cut_peaks_are_found_between_rests() -> None:
+    rest = np.zeros(SWEEP.size // 4)
+    assert len(clipping(np.concatenate([rest, np.clip(SWEEP, -0.8, 0.8), rest]))) == 2
+
+
 def test_cut_peaks_are_found_after_a_converter() -> None:
     quantum = 2.0 / 4096
     assert len(clipping(np.clip(np.round(SWEEP / quantum) * quantum, -0.8, 0.8))) == 2

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigsight.records.sensor_signs import codes, held, is_wrapped, wrapping_counter
+from rigsight.records.sensor_signs import begins_again, codes, held, is_wrapped, wrapping_counter
 
 T = 1e-3 * np.arange(8000)
 MOTION = 2.0 * np.sin(3.0 * T) + np.sin(11.0 * T)
@@ -49,6 +49,16 @@ def test_each_of_two_codes_is_found() -> None:
 )
 def test_a_level_that_a_signal_reaches_by_itself_is_no_code(samples: NDArray[np.float64]) -> None:
     assert codes(samples) == ()
+
+
+def test_a_counter_of_any_range_begins_again_and_interference_does_not() -> None:
+    counts = np.floor(np.mod(700.0 * MOTION, 1000.0))
+    assert begins_again(counts)
+    assert begins_again(1e-3 * counts)
+    assert not begins_again(MOTION)
+    assert not begins_again(_with(MOTION, 20.0, 40, 900))
+    assert not begins_again(_with(MOTION, float(np.min(MOTION)), int(np.argmax(MOTION))))
+    assert not begins_again(MOTION + 20.0 * (T > 4.0))
 
 
 def test_an_angle_within_a_turn_is_wrapped_either_way_it_is_counted() -> None:

@@ -14,6 +14,7 @@ from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import Record
+from rigsight.report.labels import written
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.model import Model
@@ -21,6 +22,7 @@ from rigsight.workflow.difference import Difference, Verdict, run_difference
 
 Run = Callable[..., tuple[int, str, str]]
 VALUES = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
+LACKING: dict[str, dict[str, float]] = {"free": {}, "rubs": {"T_c": 1.0}}
 FREE = ("m", "d", "k", "x_off")
 
 
@@ -107,6 +109,14 @@ def test_equal_rigs_are_rarely_called_changed(tmp_path: Path) -> None:
     assert sum(called) <= 4
 
 
+def test_numbers_are_written_to_the_digits_of_their_errors(tmp_path: Path, run: Run) -> None:
+    folders = [diagnosed(tmp_path / "a", 1), diagnosed(tmp_path / "b", 2)]
+    _, out, _ = run("difference", *folders, "--out", tmp_path / "out")
+    known = next(row for row in run_difference(folders).rows if row.name == "m").values[0]
+    assert known is not None
+    assert written(known.value, known.with_scatter).value in out
+
+
 def test_what_cannot_be_compared_is_told(tmp_path: Path, run: Run) -> None:
     a, out = diagnosed(tmp_path / "a", 1), tmp_path / "out"
     other = diagnosed(tmp_path / "other", 1, lambda content: content.update(rig="servo"))
@@ -116,6 +126,7 @@ def test_what_cannot_be_compared_is_told(tmp_path: Path, run: Run) -> None:
         ([a, tmp_path / "gone"], "contains neither diagnosis.json nor campaign.toml"),
         ([a, other], "of 'servo'"),
         ([a, broken], "candidates"),
+        ([a, other / "model.json"], "name the folder of the results"),
         ([a, a, "--at", "1,2"], "three or more"),
         ([a, a, a, "--at", "1,2"], "2 values for 3"),
         ([a, a, a, "--at", "cold"], "cannot be read"),
@@ -168,3 +179,11 @@ def test_one_record_does_not_show_what_differs_between_records(tmp_path: Path) -
     found = run_difference(folders, n_jobs=1)
     assert [own.has_one_record for own in found.units] == [True, True]
     assert "only look so" in found.conclusion
+
+
+def test_an_effect_that_the_equations_lack_may_have_changed(tmp_path: Path) -> None:
+    units = [unit(tmp_path / name, i, (2.0, 3.0), **own) for i, (name, own) in enumerate(LACKING.items())]
+    told = run_difference(units, n_jobs=1).conclusion
+    assert "an effect may have changed which they lack" in told
+    assert str(units[1]) in told
+    assert f"({units[0]})" not in told

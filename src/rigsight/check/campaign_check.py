@@ -12,7 +12,7 @@ from scipy.signal import resample_poly
 from rigsight.campaign import Campaign
 from rigsight.check.channels import CheckedRecord, checked_record
 from rigsight.check.effect_matrix import EffectMatrix, effect_matrix
-from rigsight.check.remarks import Remark, remarks
+from rigsight.check.remarks import Remark, remarks, with_offsets
 from rigsight.diagnose.data_quality.amplitude_response import amplitude_dependences
 from rigsight.diagnose.data_quality.finding import AmplitudeDependence
 from rigsight.diagnose.fit_context import start_values_of
@@ -27,6 +27,7 @@ from rigsight.identify.linear_view import longest_free_run, near_rest
 from rigsight.inverse import numbers_along_motion, with_all_inputs
 from rigsight.json_data import json_data
 from rigsight.records import Record
+from rigsight.records.record import Floats
 from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
@@ -128,19 +129,21 @@ def check_campaign(campaign: Campaign, effects: Sequence[Effect], say: Callable[
     rig = campaign.rig
     records = tuple(checked_record(rig, record) for record in campaign.records)
     say(PARTS[0])
-    coarser = _coarser_records(rig, [with_all_inputs(rig, record) for record in campaign.estimation])
+    everything = _coarser_records(rig, [with_all_inputs(rig, record) for record in campaign.records])
+    coarser = tuple(record for record in everything if record.role == "estimation")
     short = liveliest(coarser, rig, _OF_EFFECTS)
     floors = noise_floors(rig, campaign.records, campaign.drifts)
     say(PARTS[1])
     values = _values(replace(campaign, records=coarser))
     linear = _near_rest(campaign, short, values)
-    found = remarks(campaign, short, records, floors, linear)
+    found = remarks(campaign, short, liveliest(everything, rig, _OF_PARAMETERS), records, floors, linear)
     faulty = {(one.record or "", one.signal or "") for one in found if one.severity == "fault"}
     answers = amplitude_dependences(rig, coarser, faulty)
     say(PARTS[2])
-    parameters, statement = _parameters(
+    parameters, statement, left = _parameters(
         campaign, liveliest(coarser, rig, _OF_PARAMETERS), values, {f.output: f.std for f in floors}, linear
     )
+    found = with_offsets(found, rig, *left)
     say(PARTS[3])
     matrix = effect_matrix(campaign, short, values, effects)
     say(PARTS[4])
@@ -198,8 +201,11 @@ def _parameters(
     values: Mapping[str, float],
     noise: Mapping[str, float],
     linear: Linearization | None,
-) -> tuple[tuple[CheckedParameter, ...], str]:
-    """Return the parameters with the statement on those that are not determined; none where the start cannot be simulated."""
+) -> tuple[tuple[CheckedParameter, ...], str, tuple[Sequence[Record], Sequence[Floats]]]:
+    """Return the parameters with the statement on those that are not determined, and what a rough fit leaves of its windows.
+
+    There are none where the start cannot be simulated.
+    """
     rig, structure = campaign.rig, compose(campaign.rig, campaign.modelled)
     limit = None if linear is None else longest_free_run(linear.poles, records)
     if limit is not None or campaign.drifts:
@@ -216,13 +222,17 @@ def _parameters(
         why = (
             "The equations cannot be simulated at these numbers, so what the records determine is not known."
         )
-        return (), why
+        return (), why, (windows, ())
     found = identifiability(information(fit, result))
     units = {p.name: p.unit for p in structure.parameters}
-    return tuple(
+    parameters = tuple(
         CheckedParameter(name, units[name], _status(name, found), error)
         for name, error in found.relative_errors.items()
-    ), " ".join([found.sentence, *([factor.sentence] if factor is not None and factor.is_given else [])])
+    )
+    statement = " ".join(
+        [found.sentence, *([factor.sentence] if factor is not None and factor.is_given else [])]
+    )
+    return parameters, statement, (windows, result.residuals)
 
 
 def _status(name: str, found: Identifiability) -> Status:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,16 +11,22 @@ import numpy as np
 from rigsight.campaign import Campaign
 from rigsight.check.channels import CheckedRecord
 from rigsight.diagnose.data_quality.checks import sensor_faults
+from rigsight.diagnose.data_quality.finding import Finding
+from rigsight.diagnose.data_quality.offsets_by_record import levels_apart
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.noise.detection import NoiseFloor
+from rigsight.identify import OFFSETS_MEND, differing_means
 from rigsight.identify.closed_loop import closed_loop_notes
+from rigsight.identify.start.linear_start import moves_against
 from rigsight.records import Record
 from rigsight.records.record import Floats
-from rigsight.records.signals import is_constant, moves_beyond_noise
+from rigsight.records.signals import instrument_of, is_constant, moves_beyond_noise
+from rigsight.rigs import Rig, evaluated
 from rigsight.simulate import compose
 from rigsight.simulate.linearization import Linearization
 
 Severity = Literal["fault", "warning", "note"]
-_WARNING = "Warning: "
+WARNING = "Warning: "
 """Before a note of the reading that asks for attention."""
 _NOISY_INPUT = 0.02
 """Noise of an input over its standard deviation from which estimates suffer, most at high frequencies (a convention)."""
@@ -54,11 +60,12 @@ class Remark:
 def remarks(
     campaign: Campaign,
     short: Sequence[Record],
+    long: Sequence[Record],
     records: Sequence[CheckedRecord],
     floors: Sequence[NoiseFloor],
     linear: Linearization | None,
 ) -> tuple[Remark, ...]:
-    """Return what is to be known, the gravest first."""
+    """Return what is to be known, the gravest first; short and long are stretches of the estimation and of all records."""
     found = [
         Remark(
             "fault" if f.serious and f.kind != "clipping" else "warning",
@@ -67,26 +74,55 @@ def remarks(
             f.record,
             f.signal,
         )
-        for f in sensor_faults(campaign.rig, campaign.records)
+        for f in (*_levels_apart(campaign), *sensor_faults(campaign.rig, campaign.records))
     ]
     found += _of_reading(campaign)
     found += _noisy_inputs(campaign, records)
+    found += _reversed(campaign, long)
     found += _lasting(campaign)
     found += _unstable(linear)
     found += _feedback(campaign, short)
     found += _floors(floors)
     found += _at_bounds(campaign)
+    return by_gravity(found)
+
+
+def by_gravity(found: Iterable[Remark]) -> tuple[Remark, ...]:
+    """Return remarks, the gravest first."""
     order = ("fault", "warning", "note")
     return tuple(sorted(found, key=lambda one: order.index(one.severity)))
 
 
+def with_offsets(
+    found: Sequence[Remark], rig: Rig, records: Sequence[Record], residuals: Sequence[Floats]
+) -> tuple[Remark, ...]:
+    """Return remarks with the sensors whose mean residual of a rough fit, by record or window, differs between records."""
+    units = {signal.name: signal.unit for signal in rig.outputs}
+    differing = differing_means([record.origin for record in records], records, residuals, list(units))
+    # Means that differ by more than the motion are told already.
+    told = {one.signal for one in found if one.remedy == OFFSETS_MEND}
+    offsets = [
+        Remark("warning", one.sentence(units[one.output]), OFFSETS_MEND, signal=one.output)
+        for one in differing
+        if one.output not in told
+    ]
+    return by_gravity([*found, *offsets])
+
+
+def _levels_apart(campaign: Campaign) -> list[Finding]:
+    records, held = campaign.records, frozenset(filter(None, [campaign.absent_spring]))
+    known = {**campaign.constants, **campaign.given}
+    return levels_apart(
+        FitContext(campaign.rig, records, records, records, {}, {}, held, given=known), records
+    )
+
+
 def _of_reading(campaign: Campaign) -> Iterator[Remark]:
-    for note in campaign.notes:
-        yield Remark("note", note)
-    for record in campaign.records:
-        for note in record.notes:
-            is_warning = note.startswith(_WARNING)
-            yield Remark("warning" if is_warning else "note", note.removeprefix(_WARNING), record=record.name)
+    notes: list[tuple[str, str | None]] = [(note, None) for note in campaign.notes]
+    notes += [(note, record.name) for record in campaign.records for note in record.notes]
+    for note, record in notes:
+        severity: Severity = "warning" if note.startswith(WARNING) else "note"
+        yield Remark(severity, note.removeprefix(WARNING), record=record)
 
 
 def _noisy_inputs(campaign: Campaign, records: Sequence[CheckedRecord]) -> Iterator[Remark]:
@@ -105,6 +141,30 @@ def _noisy_inputs(campaign: Campaign, records: Sequence[CheckedRecord]) -> Itera
                     record.name,
                     channel.name,
                 )
+
+
+def _reversed(campaign: Campaign, records: Sequence[Record]) -> Iterator[Remark]:
+    """Yield records that move against their drive: one of the signals has the opposite sign."""
+    rig, known = campaign.rig, {**campaign.constants, **campaign.given}
+    if not (rig.has_one_motion and rig.is_driven) or rig.controllers:
+        return
+    if not {symbol.name for symbol in rig.motion.drive_gain.free_symbols} <= known.keys():
+        return
+    source, response = rig.inputs[0].name, rig.outputs[0].name
+    for record in records:
+        still = response not in record or is_constant(record[source]) or is_constant(record[response])
+        if still or instrument_of(record, rig.signal_units):
+            continue
+        gain = evaluated(rig.motion.drive_gain, {**known, **record.constants})
+        if moves_against(record, source, response, gain, campaign.absent_spring is None):
+            yield Remark(
+                "fault",
+                f"Record {record.name}: {response} moves against {source}, which no rig with these equations does: one of the "
+                "signals has the opposite sign.",
+                f'Change the sign of that signal: {response} = {{ name = "...", scale = -1.0 }}.',
+                record.name,
+                response,
+            )
 
 
 def _driving(campaign: Campaign) -> list[str]:

@@ -248,10 +248,11 @@ def _difference_summary(found: Difference) -> RenderableType:
     from rich.markup import escape
 
     from rigsight.plot.drawing import with_unit
+    from rigsight.report.labels import plain, written
 
     rows = []
     for row in found.rows:
-        values = ["" if own is None else f"{own.value:.4g} +/- {own.with_scatter:.2g}" for own in row.values]
+        values = ["" if own is None else plain(written(own.value, own.with_scatter)) for own in row.values]
         trend = "" if row.trend is None else f" (slope {row.trend.slope:.2g} +/- {row.trend.std:.1g})"
         apart = "" if row.difference != row.difference else f"{row.difference:+.1f}"
         rows.append((with_unit(row.name, row.unit), *values, apart, row.verdict + trend))

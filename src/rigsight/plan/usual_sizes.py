@@ -110,15 +110,14 @@ def _known(context: FitContext, fit: FitResult, only_rig: bool) -> Floats:
 
 
 def _of_usual_size(context: FitContext, one: Named, base: FitResult) -> FitResult:
-    found = base
+    # No record holds it yet: it starts where the planned one does, also without an effect.
+    found = replace(base, cost=0.0, initial_states=())
     for number in range(len(one.effects)):
         effects = one.effects[: number + 1]
         structure = context.simplest(effects, found.structure)
         values = next(iter(start_values(context, structure, effects[-1], found, {})))
         free = context.free_parameters(structure)
-        found = replace(
-            found, structure=structure, values=values, free=tuple(free), cost=0.0, initial_states=()
-        )
+        found = replace(found, structure=structure, values=values, free=tuple(free))
     return found
 
 

@@ -28,6 +28,8 @@ _CODES = np.array([*_NINES, -999.25, *_ENDS])
 """Nines, the code of LAS files, and the ends of whole numbers of 16, 24 and 32 bits."""
 _MOST_CODES = 0.5
 """Share of the samples: what is there most of the time is a level of the signal."""
+_SPIKE = 3
+"""Samples within which interference is over (an assumption)."""
 FULL_TURNS = (2.0 * math.pi, 360.0)
 _COUNTERS = tuple(2.0**n for n in range(8, 33))
 _CLEARLY = 0.25
@@ -93,6 +95,15 @@ def is_wrapped(samples: Floats, period: float) -> bool:
         and np.max(on) <= 2.0 * np.max(np.abs(elsewhere), initial=0.0)
         and np.count_nonzero(elsewhere) > jumps.size
     )
+
+
+def begins_again(samples: Floats) -> bool:
+    """Return True if a signal of shape (n_samples,), in any unit, goes on from the other end of its range at each jump."""
+    span = float(np.ptp(samples))
+    jumps = np.flatnonzero(np.abs(np.diff(samples)) > 0.5 * span)
+    apart = np.diff(jumps, prepend=-samples.size, append=2 * samples.size)
+    # Interference jumps there and at once back.
+    return is_wrapped(samples, span) and bool(np.any(np.minimum(apart[1:], apart[:-1]) > _SPIKE))
 
 
 def wrapping_counter(samples: Floats) -> float | None:

@@ -52,11 +52,14 @@ def clipping(samples: Floats) -> tuple[tuple[float, int], ...]:
     # A clipped signal reaches its extreme at speed and is exactly constant there, repeatedly, while it changes from sample to
     # sample elsewhere. Steps, held inputs and coarsely quantized signals are constant elsewhere too; a signal at rest reaches its
     # level once, or slowly.
+    # The rest before and after a motion says nothing of how the signal changes within it.
+    changes = np.flatnonzero(np.diff(samples))
+    if changes.size == 0:
+        return ()
+    samples = samples[changes[0] : changes[-1] + 2]
     steps = np.diff(samples)
     typical_step = float(np.sqrt(np.mean(steps**2)))
     moving = np.abs(steps[steps != 0.0])
-    if moving.size == 0:
-        return ()
     levels = (float(samples.min()), float(samples.max()))
     extreme = (samples == levels[0]) | (samples == levels[1])
     elsewhere = ~(extreme[1:] & extreme[:-1])

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from rigsight.plan import Plan, Sizes
+from rigsight.plan.planning import DECIDED
 from rigsight.report.figures import page_figure
 from rigsight.report.labels import percent
 from rigsight.report.page import rendered
@@ -22,6 +23,8 @@ _SIZES: Mapping[Sizes, str] = {
 }
 _GAIN = 0.05
 """Gain of probability below which an experiment is not worth its time (a convention)."""
+_MOSTLY = 0.5
+"""Share of the outcomes from which an experiment that decides tells rivals apart (a convention)."""
 
 
 def render_plan(plan: Plan, picture: Figure, command: str, versions: Mapping[str, str], seed: int) -> str:
@@ -64,9 +67,14 @@ def plan_headline(plan: Plan) -> str:
 def promise(plan: Plan) -> str:
     """Return what to expect afterwards."""
     trials = plan.trials
-    gains = plan.promised > plan.now + _GAIN
+    told = ""
+    # No probability exceeds that of a verdict, so that one which is high already hardly gains.
+    if plan.now >= DECIDED:
+        told = "The records decide between these rivals already. "
+    elif plan.promised <= plan.now + _GAIN and trials.decided <= _MOSTLY:
+        told = "No record within these limits tells these rivals apart. "
     return (
-        f"{'' if gains else 'No record within these limits tells these rivals apart. '}"
+        f"{told}"
         f"Expected probability of the cause: {plan.now:.2f} now, {plan.promised:.2f} afterwards. "
         f"In {trials.n} simulated outcomes the cause was the most probable in {percent(trials.right)}, "
         f"decided in {percent(trials.decided)}, wrongly in {percent(trials.wrong)}."

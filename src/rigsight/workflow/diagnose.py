@@ -19,6 +19,7 @@ from typing import Any, Self
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
+from rigsight.check.remarks import WARNING
 from rigsight.diagnose.diagnosis import diagnose
 from rigsight.diagnose.fit_context import structures_to_fit
 from rigsight.diagnose.result import Diagnosis
@@ -74,7 +75,8 @@ def run_diagnose(
         return diagnose_campaign(read, effects, seed, jobs, listener)
     folder, check = Path(out), check_of(read, effects, listener)
     # Whoever reads that a record is faulty, or was not read as meant, need not wait for the verdict.
-    report_notes(check.before_a_fit, listener)
+    follows = [note.removeprefix(WARNING) for note in read.notes]
+    report_notes((told for told in check.before_a_fit if told not in follows), listener)
 
     def keep(diagnosis: Diagnosis) -> None:
         made_from = origin(read, diagnosis, called, folder, by)

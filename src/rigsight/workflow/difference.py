@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, TypeVar
@@ -40,6 +40,7 @@ from rigsight.workflow.differing import (
     unit_of_records,
     with_effects_of,
 )
+from rigsight.workflow.identification.joint import motion_left
 from rigsight.workflow.identification.rig import identify_rig
 from rigsight.workflow.run.kernels import checked_jobs
 from rigsight.workflow.run.progress import Listener, silent
@@ -124,6 +125,12 @@ class Difference:
             if others
             else ""
         ) + scatter
+        lacking = [f"{unit.left} ({unit.name})" for unit in self.units if unit.left]
+        if lacking:
+            besides += (
+                f" The equations leave {', '.join(lacking)}, more than noise: an effect may have changed which they lack. Run "
+                "'rigsight diagnose' on each, and compare the results."
+            )
         if not self.changed:
             return f"No number changed beyond what records of one campaign differ.{besides}"
         names = ", ".join(row.name for row in self.changed)
@@ -222,15 +229,17 @@ def _units(
         models.append((model.effects, model.values))
     for path, campaign in read.items():
         whole = with_effects_of(campaign, models)
-        found[path] = unit_of_records(
-            str(path), whole, identify_rig(whole, EstimationOptions(), jobs, listener)
-        )
+        identified = identify_rig(whole, EstimationOptions(), jobs, listener)
+        left = motion_left(identified.joint.scores, whole.estimation)
+        found[path] = replace(unit_of_records(str(path), whole, identified), left=next(iter(left), ""))
     return [found[path] for path in paths]
 
 
 def _is_campaign(path: Path) -> bool:
     """Return whether a path is a campaign and no folder of a diagnosis."""
-    return path.is_file() or ((path / "campaign.toml").is_file() and not (path / DIAGNOSIS_FILE).is_file())
+    if path.is_file():
+        return path.suffix != ".json"
+    return (path / "campaign.toml").is_file() and not (path / DIAGNOSIS_FILE).is_file()
 
 
 def _rows(units: Sequence[Unit], along: Sequence[float]) -> tuple[Row, ...]:

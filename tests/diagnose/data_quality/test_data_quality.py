@@ -313,6 +313,14 @@ def test_a_constant_start_is_not_stuck():
     assert not [f for f in sensor_faults(AXIS, [counted]) if f.kind == "stuck"]
 
 
+def test_an_encoder_that_begins_again_at_any_number_is_offered_its_period() -> None:
+    angle = 40.0 * np.sin(2.0 * DT * np.arange(4000))
+    counts = np.floor(np.mod(angle / (2.0 * np.pi) * 1000.0, 1000.0))
+    record = sweeps()[0].with_signals(x=counts * 2.0 * np.pi / 1000.0)
+    (found,) = sensor_faults(AXIS, [record])
+    assert (found.kind, "unwrap = N" in found.remedy, "6.283 m" in found.remedy) == ("jump", True, True)
+
+
 def test_an_encoder_that_toggles_by_one_count_does_not_jump():
     record = sweeps()[0]
     size = np.ptp(record["u"]) / 20

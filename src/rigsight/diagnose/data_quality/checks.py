@@ -16,6 +16,7 @@ from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import NOTES
 from rigsight.identify import OFFSETS_MEND
 from rigsight.records.record import Floats, Record
+from rigsight.records.sensor_signs import begins_again
 from rigsight.records.signals import clipping
 from rigsight.records.stamps import written_span, written_stamp
 from rigsight.rigs import Rig
@@ -235,12 +236,22 @@ def _jumping(record: Record, name: str, unit: str) -> list[Finding]:
         for place, step in zip(places[: NOTES.first_reported], steps, strict=False)
     )
     largest = max(float(np.max(step)) for step in steps)
+    why, remedy = (
+        "no mass can move like that",
+        "Check for interference or lost counts; repair the samples or leave the record out.",
+    )
+    if begins_again(samples):
+        why = "it goes on from the other end of its range, as an encoder does after a turn"
+        remedy = (
+            f'Write {name} = {{ name = "...", unwrap = N }} in the columns of the record, where N is its period, about '
+            f"{np.ptp(samples) + count:.4g}{behind(unit)}, in the numbers of the column."
+        )
     return [
         Finding(
             "jump",
             f"Record {record.name}: {name} jumps by about {largest:.3g}{behind(unit)} at {reported}"
-            f"{_more(len(places))}; no mass can move like that.",
-            "Check for interference or lost counts; repair the samples or leave the record out.",
+            f"{_more(len(places))}; {why}.",
+            remedy,
             record=record.name,
             signal=name,
         )

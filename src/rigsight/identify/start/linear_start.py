@@ -36,6 +36,8 @@ _ITERATIONS = 20
 _TRANSIENT_ORDER = 2
 _EXCITED = 1e-3
 _MIN_LINES = 20
+_LEFT = 0.5
+"""Share of a response that equations leave below which they explain the larger part of it."""
 Term = tuple[int, NDArray[np.complex128]]
 """Power of j omega and the spectrum that it multiplies."""
 
@@ -218,6 +220,22 @@ def second_order(
     if turned or not any_damping:
         damping = max(damping, 1e-4 * np.sqrt(stiffness * inertia) if stiffness > 0.0 else 0.0)
     return float(inertia), float(damping), float(stiffness)
+
+
+def moves_against(record: Record, source: str, response: str, gain: float, has_stiffness: bool) -> bool:
+    """Return True if a record fits ``m x'' + d x' + k x = gain u`` with negative numbers: one signal has the opposite sign."""
+    block = spectra_of(record, source, response)
+    numbers = _equation_error([record], source, response, (2, 1, 0) if has_stiffness else (2, 1), gain)
+    # An unstable rig has a negative stiffness or damping, but never all. A controller that rejects disturbances looks like a
+    # negative spring and damper: the inertia must count within the band.
+    inertia, *others = numbers
+    if not (
+        np.all(numbers < 0.0) and abs(inertia) * np.max(block.omega) ** 2 > abs(others[-1]) * has_stiffness
+    ):
+        return False
+    s = 1j * block.omega
+    moved = gain * block.drive / (inertia * s**2 + others[0] * s + (others[1] if has_stiffness else 0.0))
+    return bool(np.sum(np.abs(block.response - moved) ** 2) < _LEFT * np.sum(np.abs(block.response) ** 2))
 
 
 def _equation_error(

@@ -84,8 +84,8 @@ def _rates_apart(records: Sequence[Record]) -> Iterator[str]:
     finest, coarsest = (choose(records, key=lambda record: record.dt) for choose in (min, max))
     if coarsest.dt >= _RATES_APART * finest.dt:
         yield (
-            f"The sample times of the records differ by a factor of {coarsest.dt / finest.dt:.3g}: '{finest.name}' has "
-            f"{finest.dt:.3g} s, '{coarsest.name}' {coarsest.dt:.3g} s. Is the time of one of them in ms? Then write "
+            f"Warning: The sample times of the records differ by a factor of {coarsest.dt / finest.dt:.3g}: '{finest.name}' "
+            f"has {finest.dt:.3g} s, '{coarsest.name}' {coarsest.dt:.3g} s. Is the time of one of them in ms? Then write "
             't = { name = "...", unit = "ms" } for it.'
         )
 
@@ -101,9 +101,9 @@ def _other_units(rig: Rig, records: Sequence[Record]) -> Iterator[str]:
             if found is not None:
                 larger, smaller, ratio = found
                 yield (
-                    f"At the same frequencies '{output.name}' moves {ratio:.3g} times as far per unit of '{source.name}' in "
-                    f"record '{larger.name}' as in '{smaller.name}'. Is one of the two signals in another unit there? Then give "
-                    f'its unit, for instance {output.name} = {{ name = "...", unit = "..." }}.'
+                    f"Warning: At the same frequencies '{output.name}' moves {ratio:.3g} times as far per unit of "
+                    f"'{source.name}' in record '{larger.name}' as in '{smaller.name}'. Is one of the two signals in another "
+                    f'unit there? Then give its unit, for instance {output.name} = {{ name = "...", unit = "..." }}.'
                 )
                 break
 

@@ -54,6 +54,8 @@ class Unit:
     numbers: Mapping[str, Known]
     units: Mapping[str, str]
     roles: Mapping[str, Role | Family]  # of each number in the equations, the family for one of an effect
+    # What its equations leave of its records beyond noise at the most, in words; empty where nothing is, or for a diagnosis.
+    left: str = ""
 
     @property
     def has_one_record(self) -> bool:
@@ -116,6 +118,10 @@ def refuse_other_rigs(rigs: Mapping[str, str]) -> None:
 def read_unit(folder: Path, own_effects: Iterable[Effect], own_rigs: Iterable[Rig]) -> Unit:
     """Return what a diagnosis found, by its folder."""
     file = folder / DIAGNOSIS_FILE
+    if folder.is_file():
+        raise InputError(
+            f"{folder} is neither a campaign nor a folder: name the folder of the results, {folder.parent}."
+        )
     if not file.is_file():
         raise InputError(f"{folder} contains neither {DIAGNOSIS_FILE} nor campaign.toml. {_MEND}")
     found = part_of_diagnosis(file, _Diagnosis, _MEND)

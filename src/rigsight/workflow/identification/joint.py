@@ -163,6 +163,25 @@ def _leaves_motion(relative: float, samples: Floats) -> bool:
     return relative > _SMALL_LOSS and relative * float(np.std(samples)) > MISFIT * roughness(samples)
 
 
+def motion_left(scores: Sequence[RecordScore], fitted: Sequence[Record]) -> list[str]:
+    """Return what the joint model leaves of each output of the fitted records beyond noise, in words, the most first."""
+    return _errors(scores, fitted, _leaves_motion)
+
+
+def _errors(
+    scores: Sequence[RecordScore], fitted: Sequence[Record], is_told: Callable[[float, Floats], bool]
+) -> list[str]:
+    by_name = {record.name: record for record in fitted}
+    told = [
+        (error, f"{gap_percent(error)} of {name} in '{score.record}'")
+        for score in scores
+        if score.role == "estimation"
+        for name, error in score.nrmse.items()
+        if is_told(error, by_name[score.record][name])
+    ]
+    return [words for _, words in sorted(told, reverse=True)]
+
+
 def _statement(fit: JointFit, scores: Sequence[RecordScore], fitted: Sequence[Record]) -> str:
     if not fit.fit.success:
         return f"The joint fit did not converge: {fit.fit.message.rstrip('.')}. Its parameter values are not reliable."
@@ -171,18 +190,7 @@ def _statement(fit: JointFit, scores: Sequence[RecordScore], fitted: Sequence[Re
             "Only one estimation record was fitted, so its parameters cannot be compared with others. Another kind of record, "
             "such as a step beside a sweep, or another amplitude would test them."
         )
-    by_name = {record.name: record for record in fitted}
-
-    def errors(is_told: Callable[[float, Floats], bool]) -> list[str]:
-        return [
-            f"{gap_percent(error)} of {name} in '{score.record}'"
-            for score in scores
-            if score.role == "estimation"
-            for name, error in score.nrmse.items()
-            if is_told(error, by_name[score.record][name])
-        ]
-
-    unserved = errors(_is_unserved)
+    unserved = _errors(scores, fitted, _is_unserved)
     if unserved and not fit.probability < _DIFFERENT:
         return (
             "The joint fit is too poor to judge whether one parameter set fits all records: its error is "
@@ -192,7 +200,7 @@ def _statement(fit: JointFit, scores: Sequence[RecordScore], fitted: Sequence[Re
         return "There is no parameter that every record determines, so the records cannot be compared."
     if fit.probability >= _DIFFERENT:
         agree = f"equally large differences arise by chance with probability {fit.probability:.2g}"
-        left = errors(_leaves_motion)
+        left = motion_left(scores, fitted)
         if not left:
             return f"One parameter set fits all {len(fitted)} estimation records: {agree}."
         return (
