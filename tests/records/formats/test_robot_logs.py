@@ -50,6 +50,28 @@ def test_publishers_of_different_joints_take_turns_on_one_topic(tmp_path: Path) 
         np.testing.assert_allclose(grip.axis.stamps(), 0.001 + 0.02 * np.arange(20))
 
 
+@pytest.mark.parametrize("first", [1, 90])
+def test_a_channel_has_samples_only_where_messages_hold_it(tmp_path: Path, first: int) -> None:
+    def messages(built: Any) -> Any:
+        for i in range(100):
+            time = START + i * 10_000_000
+            arm = joint_state(built, time, ["arm"], [np.nan if i == 50 else 0.1 * i])
+            yield "/joint_states", "sensor_msgs/msg/JointState", time, arm
+            if i >= first:
+                grip = joint_state(built, time + 1_000_000, ["grip"], [-0.1 * i])
+                yield "/joint_states", "sensor_msgs/msg/JointState", time + 1_000_000, grip
+
+    with open_channels(bag(tmp_path / "late", messages)) as file:
+        arm, grip = file.channels
+        assert grip.name == "joint_states/position/grip"
+        # A reading that is no number is one that the robot sent.
+        np.testing.assert_array_equal(np.flatnonzero(np.isnan(arm.load())), [50])
+        np.testing.assert_allclose(grip.load(), -0.1 * np.arange(first, 100))
+        assert arm.n_samples == 100
+        assert grip.axis is not None
+        np.testing.assert_allclose(grip.axis.stamps(), 0.001 + 0.01 * np.arange(first, 100))
+
+
 def test_a_simulated_clock_gives_way_to_the_reception(tmp_path: Path) -> None:
     def messages(built: Any) -> Any:
         for i in range(10):
