@@ -141,6 +141,8 @@ def _channels(site: Site, name: str, found: dict[str, Any]) -> None:
             text("p", f"'{one['name']}' {remark}.")
     for one in found["refused"]:
         text("p", f"No signal: '{one['name']}' {one['reason']}")
+    for note in found["notes"]:
+        text("p", f"Note: {note}")
     version = (site.root / picture_of(name)).stat().st_mtime_ns
     ui.element("img").props(
         f'src="{address_of(picture_of(name))}?{version}" alt="Plots of the channels of {name}"'
