@@ -13,8 +13,11 @@ import pytest
 from rigsight.errors import InputError
 from rigsight.records import ColumnMapping, ReadingOptions
 from rigsight.records.channel_names import closeness
+from rigsight.records.channel_table import read_columns
 from rigsight.records.formats.channel_file import open_channels
 from rigsight.records.read_record import read_stretches
+from rigsight.rigs import RIGS
+from rigsight.workflow.campaign.signal_guesses import guess_file
 
 from .robot_logs import START, bag, joint_state
 
@@ -110,6 +113,60 @@ def test_images_beside_the_joints_are_passed_over(tmp_path: Path) -> None:
         (camera,) = file.refused
         assert camera.name == "camera"
         assert "128 numbers in a message" in camera.reason
+
+
+PX4 = {"px4_msgs/msg/Servo": "uint64 timestamp\nfloat32 value"}
+
+
+def of_autopilot(path: Path, per_second: tuple[float, float], n_topics: int = 2) -> Path:
+    """Write topics with a field called timestamp that counts so many units per second, received 0.4 ms later and earlier."""
+
+    def messages(_: Any) -> Any:
+        for i in range(200):
+            for topic, units, late in zip(("act", "joint"), per_second, (400_000, -400_000), strict=True):
+                content = {"timestamp": round(7.0 * units + 0.01 * i * units), "value": np.sin(0.3 * i)}
+                time = START + i * 10_000_000 + late * (-1) ** i
+                if topic == "act" or n_topics == 2:
+                    yield topic, "px4_msgs/msg/Servo", time, content
+
+    return bag(path, messages, PX4)
+
+
+AS_MAPPED = {"u": ColumnMapping("act/value"), "x": ColumnMapping("joint/value")}
+
+
+@pytest.mark.parametrize("units", [1e3, 1e6, 1e9])
+def test_the_unit_of_a_clock_follows_from_the_stamps_of_the_bag(tmp_path: Path, units: float) -> None:
+    file = of_autopilot(tmp_path / "clock", (units, units))
+    (record,) = read_stretches(
+        file, (Named("u", "A"),), (Named("x", "m"),), ReadingOptions(columns=AS_MAPPED)
+    )
+    assert record.dt == pytest.approx(0.01, rel=1e-6)
+    assert record.n_samples == 200
+    np.testing.assert_allclose(record["x"], np.sin(0.3 * np.arange(200)), atol=1e-6)
+
+
+@pytest.mark.parametrize("per_second", [(30.0, 30.0), (2e6, 2e6), (1e6, 300.0)])
+def test_what_is_only_called_like_time_does_not_replace_the_stamps_of_the_bag(
+    tmp_path: Path, per_second: tuple[float, float]
+) -> None:
+    file = of_autopilot(tmp_path / "counter", per_second)
+    mapped = read_columns(file, {**AS_MAPPED, "t": ColumnMapping("t")}, time_is_mapped=False)
+    assert mapped.clocks == {"u": "its own time axis", "x": "its own time axis"}
+    np.testing.assert_allclose(np.ptp(mapped.clock_of("u")), 1.99, atol=1e-3)
+    # What the user calls the time is the time.
+    named = {**AS_MAPPED, "u": ColumnMapping("act/value", time="act/timestamp"), "t": ColumnMapping("t")}
+    with pytest.raises(InputError, match="cannot be compared"):
+        read_columns(file, named, time_is_mapped=False)
+
+
+@pytest.mark.parametrize("n_topics", [1, 2])
+def test_a_time_beside_the_stamps_of_a_bag_is_not_written_into_a_campaign(
+    tmp_path: Path, n_topics: int
+) -> None:
+    with open_channels(of_autopilot(tmp_path / "clock", (1e6, 1e6), n_topics)) as file:
+        guess = guess_file(file.channels, [RIGS["axis"]], is_log=True)
+    assert (guess.time.channel, dict(guess.clocks)) == (None, {})
 
 
 def episodes(folder: Path, n_episodes: int) -> Path:

@@ -107,6 +107,10 @@ def _with_clocks(found: FileGuess, channels: Sequence[Channel], own: Mapping[int
     }
     # A channel that is yet to be filled in has the time of its own as well.
     mapped = [one for one in found.signals if one.channel is not None]
+    axes = [c.axis for c in [one.channel for one in mapped if one.channel is not None] or channels]
+    if axes and all(axis is not None and axis.load is not None for axis in axes):
+        # Beside stamps of the file, reading finds out what is a clock.
+        return replace(found, time=Guess(TIME, "s"), times=frozenset(channels[i].name for i in own.values()))
     free = set(range(len(channels))) - own.keys() - set(own.values())
     if not own or len(clocks) < len(mapped) or (not mapped and free):
         return found
