@@ -12,7 +12,7 @@ import numpy as np
 from rigsight.errors import InputError
 from rigsight.records.channel_names import closeness, is_command, may_be_command, may_be_reading, split_unit
 from rigsight.records.channel_units import DRIVES, has_si, is_a
-from rigsight.records.clocks import own_clocks
+from rigsight.records.clocks import increases, is_prefixed_time, own_clocks
 from rigsight.records.formats.channel import Channel, as_floats
 from rigsight.records.read_record import TIME
 from rigsight.records.signals import REFERENCE
@@ -48,7 +48,8 @@ class Guess:
 class FileGuess:
     """What the channels of a file probably are, for one rig.
 
-    Where signals have clocks of their own, `times` are their names, and `clocks` those of the signals that are known.
+    Where signals have clocks of their own, `times` are their names, and `clocks` what a campaign calls those of the
+    signals that are known.
     """
 
     rig: Rig
@@ -78,7 +79,12 @@ def guess_file(
 
     In the log of a robot commands and readings have groups that are called so.
     """
-    own = own_clocks([channel.name for channel in channels])
+    rise = [
+        number
+        for number, channel in enumerate(channels)
+        if is_prefixed_time(channel.name) and _rises(channel)
+    ]
+    own = own_clocks([channel.name for channel in channels], rise)
     times = [channels[number] for number in set(own.values())]
     moves = cache(_moves)
     guesses = [_guess_rig(rig, channels, rising, times, moves, is_log) for rig in rigs]
@@ -117,7 +123,7 @@ def _with_clocks(found: FileGuess, channels: Sequence[Channel], own: Mapping[int
     if len(mapped) == len(found.signals) and len({id(clock) for clock in clocks.values()}) == 1:
         clock = next(iter(clocks.values()))
         return replace(found, time=Guess(TIME, "s", clock, _unit_of(clock), clock.unit is not None))
-    named = {signal: clock.name for signal, clock in clocks.items()}
+    named = {signal: clock.label for signal, clock in clocks.items()}
     return replace(
         found, time=Guess(TIME, "s"), clocks=named, times=frozenset(channels[i].name for i in own.values())
     )
@@ -266,6 +272,14 @@ def _moves(channel: Channel) -> bool:
         samples = as_floats(channel.load())
         samples = samples[np.isfinite(samples)]
         return bool(np.any(samples != samples[:1]))
+    return False
+
+
+def _rises(channel: Channel) -> bool:
+    """Return True if a channel increases up to its end, behind which the cells of a text may be blank."""
+    with suppress(InputError):
+        samples = as_floats(channel.load())
+        return increases(samples[: samples.size - int(np.argmax(np.isfinite(samples[::-1])))])
     return False
 
 
