@@ -115,6 +115,48 @@ def test_images_beside_the_joints_are_passed_over(tmp_path: Path) -> None:
         assert "128 numbers in a message" in camera.reason
 
 
+BUS = {
+    "acme_msgs/msg/Bus": "builtin_interfaces/Time stamp\nstring name\nfloat64[3] wrench",
+    "acme_msgs/msg/Joint": "float64 angle",
+    "acme_msgs/msg/Joints": "string[] name\nacme_msgs/Joint[] joints",
+}
+
+
+def test_names_are_those_of_joints_not_of_points_in_time(tmp_path: Path) -> None:
+    def messages(built: Any) -> Any:
+        moment, empty = built("builtin_interfaces/msg/Duration", {"sec": 0, "nanosec": 0}), np.zeros(0)
+        for i in range(5):
+            time = START + i * 10_000_000
+            head = joint_state(built, time, [], [])["header"]
+            of_point = {
+                "velocities": empty,
+                "accelerations": empty,
+                "effort": empty,
+                "time_from_start": moment,
+            }
+            point = built(
+                "trajectory_msgs/msg/JointTrajectoryPoint", {"positions": np.array([1.0, 2.0]), **of_point}
+            )
+            goal = {"header": head, "joint_names": ["arm", "grip"], "points": [point, point]}
+            yield "/goal", "trajectory_msgs/msg/JointTrajectory", time, goal
+            bus = {"stamp": head.stamp, "name": "arm", "wrench": np.arange(3.0)}
+            yield "/bus", "acme_msgs/msg/Bus", time + 2_000_000 + i * 1_000_000, bus
+            joints = [built("acme_msgs/msg/Joint", {"angle": 1.0}) for _ in range(2)]
+            yield "/all", "acme_msgs/msg/Joints", time, {"name": ["arm", "grip"], "joints": joints}
+
+    with open_channels(bag(tmp_path / "names", messages, BUS)) as file:
+        axes = {c.name: c.axis for c in file.channels if "time_from_start" not in c.name}
+        assert list(axes) == [
+            *(f"goal/points/{point}/positions/{joint}" for point in (0, 1) for joint in ("arm", "grip")),
+            *(f"bus/wrench/{entry}" for entry in range(3)),
+            "all/joints/arm/angle",
+            "all/joints/grip/angle",
+        ]
+        of_bus = axes["bus/wrench/0"]
+        assert of_bus is not None
+        np.testing.assert_allclose(of_bus.stamps(), 0.01 * np.arange(5))
+
+
 PX4 = {"px4_msgs/msg/Servo": "uint64 timestamp\nfloat32 value"}
 
 

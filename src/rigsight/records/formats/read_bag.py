@@ -138,27 +138,43 @@ def _channels(topic: str, numbers: _Numbers, zero: int) -> Iterator[Channel | Re
 
 
 def _stamp(message: Any, received: int) -> int:
-    """Return the time of the header [ns] where it has one on the clock of the reception."""
-    stamp = getattr(getattr(message, "header", None), "stamp", None)
-    if stamp is None:
+    """Return the time of the header, or of the message itself [ns], where it has one on the clock of the reception."""
+    stamp: Any = getattr(getattr(message, "header", message), "stamp", None)
+    if not _is_moment(stamp):
         return received
     own = int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
     return own if abs(own - received) < 1e9 * _OTHER_CLOCK else received
 
 
+def _is_moment(value: Any) -> bool:
+    return is_dataclass(value) and hasattr(value, "nanosec")
+
+
+def _are_names(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(own, str) for own in value)
+
+
 def _flat(value: Any, path: str, names: Sequence[str]) -> Iterator[tuple[str, float]]:
     """Yield the numbers in a value; lists that are as long as the names of its message are named by them."""
     if is_dataclass(value):
-        names = next((own for key in _LISTS_OF_NAMES if (own := getattr(value, key, None))), names)
+        possible: list[Any] = [getattr(value, key, None) for key in _LISTS_OF_NAMES]
+        names = next(filter(_are_names, possible), names)
         for field in fields(value):
-            if field.name not in _NO_READINGS and not field.name.startswith("__"):
-                inner = f"{path}/{field.name}" if path else field.name
-                yield from _flat(getattr(value, field.name), inner, names)
+            inner, own = f"{path}/{field.name}" if path else field.name, getattr(value, field.name)
+            is_its_time = inner == "stamp" and _is_moment(own)
+            if field.name not in _NO_READINGS and not field.name.startswith("__") and not is_its_time:
+                yield from _flat(own, inner, names)
     elif isinstance(value, bool | int | float | np.number | np.bool_):
         yield path, float(value)
     elif isinstance(value, list | np.ndarray):
         if len(value) > MOST_COLUMNS:
             raise _NoSignalsError(f"with {len(value)} numbers in a message, not signals side by side")
-        labels = names if len(value) == len(names) else range(len(value))
-        for label, part in zip(labels, value, strict=True):
-            yield from _flat(part, f"{path}/{label}", ())
+        is_named = len(value) == len(names) and not any(map(_needs_names, value))
+        for label, part in zip(names if is_named else range(len(value)), value, strict=True):
+            yield from _flat(part, f"{path}/{label}", () if is_named else names)
+
+
+def _needs_names(part: Any) -> bool:
+    """Return True for a message with lists of numbers and no names for them, as a point of a trajectory of joints."""
+    held = [getattr(part, field.name) for field in fields(part)] if is_dataclass(part) else []
+    return any(isinstance(own, np.ndarray) for own in held) and not any(map(_are_names, held))
