@@ -16,7 +16,7 @@ from rigsight.records.formats.channel import Channel, ChannelFile
 from rigsight.records.formats.known import FORMATS as KNOWN
 from rigsight.rigs import RIGS
 
-from ..records.formats.files import FORMATS, Write, write_matlab, write_tdms, write_text
+from ..records.formats.files import FORMATS, Write, write_matlab, write_tdms, write_text, write_ulog
 
 Run = Callable[..., tuple[int, str, str]]
 T = 0.01 * np.arange(300)
@@ -117,6 +117,16 @@ def test_what_is_no_signal_is_told(tmp_path: Path, run: Run) -> None:
     _, stdout, _ = run("inspect", tmp_path / "run.mat")
     assert "'fs' holds a single number" in stdout
     assert "'note' is text" in stdout
+
+
+def test_a_log_that_is_cut_short_says_so(tmp_path: Path, run: Run) -> None:
+    pytest.importorskip("pyulog")
+    write_ulog(tmp_path / "run.ulg", ROWS, {})
+    assert json.loads(run("inspect", tmp_path / "run.ulg", "--json")[1])["notes"] == []
+    log = bytearray((tmp_path / "run.ulg").read_bytes())
+    log[4000:4200] = bytes(200)
+    (tmp_path / "run.ulg").write_bytes(log)
+    assert "run.ulg: the log is cut short or damaged" in run("inspect", tmp_path / "run.ulg")[1]
 
 
 @pytest.mark.parametrize("content", [b"", b"nothing", bytes(100)])

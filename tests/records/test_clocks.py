@@ -156,6 +156,31 @@ def test_each_signal_goes_by_its_own_clock(tmp_path: Path, name: str) -> None:
     assert "clocks of their own" in record.notes[0]
 
 
+@pytest.mark.parametrize(
+    ("head", "drive", "stage"),
+    [("time;u;time;x", "1", "3"), ("t_cmd;u;t_stage;x", "t_cmd", "t_stage"), ("note;t_cmd;u;t_x;x", "t_cmd", "t_x"),
+     ("note;time;u;time;x", "2", "4")],
+)  # fmt: skip
+def test_init_names_times_as_reading_finds_them(tmp_path: Path, head: str, drive: str, stage: str) -> None:
+    write_csv(tmp_path / "run.csv", head.removeprefix("note;"))
+    if head.startswith("note"):
+        first, *rows = (tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()
+        text = "\n".join([f"note;{first}", *(f"as planned;{row}" for row in rows)])
+        (tmp_path / "run.csv").write_text(text + "\n", encoding="utf-8")
+    path = run_init(tmp_path, model="axis").path
+    text = path.read_text(encoding="utf-8")
+    assert f'time = "{drive}"' in text
+    assert f'time = "{stage}"' in text
+    path.write_text(text.replace('hold = "foh"', 'hold = "band_limited"'), encoding="utf-8")
+    check_times(read_campaign(tmp_path).records[0])
+
+
+def test_what_only_begins_like_a_time_is_none(tmp_path: Path) -> None:
+    rows = "".join(f"{t:.2f};{np.sin(t):.5f};{20.0 + np.cos(t):.5f};{np.cos(t):.5f}\n" for t in DRIVE)
+    (tmp_path / "run.csv").write_text("t_log;u;t_oil;x\n" + rows, encoding="utf-8")
+    assert "time = " not in run_init(tmp_path, model="axis").path.read_text(encoding="utf-8")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in WRITERS if name != "MDF groups"])
 def test_init_proposes_what_can_be_read(tmp_path: Path, name: str) -> None:

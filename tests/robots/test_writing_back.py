@@ -233,6 +233,13 @@ def test_isaac_settings_hold_friction_and_delay_of_each_joint() -> None:
     assert any("cubic_stiffness at elbow" in one for one in found.without_field)
 
 
+def test_a_gain_that_is_written_is_not_listed_as_left_out() -> None:
+    found = isaac_settings(model_of({"shoulder_motor_kp": 30.0, "shoulder_motor_kv": 0.6}, {}), ARM)
+    group = yaml.safe_load(found.text)["actuators"]["shoulder"]
+    assert (group["stiffness"], group["damping"]) == (30.0, 0.6)
+    assert not any("_kp" in one or "_kv" in one for one in found.without_field)
+
+
 @pytest.mark.parametrize(
     ("force_range", "limit", "left_out"),
     [

@@ -152,6 +152,8 @@ def _channels(site: Site, name: str, found: dict[str, Any]) -> None:
             text("p", f"'{one['name']}' {remark}.")
     for one in found["refused"]:
         text("p", f"No signal: '{one['name']}' {one['reason']}")
+    for note in found["notes"]:
+        text("p", f"Note: {note}")
     version = (site.root / picture_of(name)).stat().st_mtime_ns
     source = f"{address_of(picture_of(name))}?{version}"
     with_attributes(ui.element("img"), src=source, alt=f"Plots of the channels of {name}")

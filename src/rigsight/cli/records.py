@@ -66,6 +66,8 @@ def inspect(
                 typer.echo(f"'{channel.name}' {remark}.")
         for refused in found.refused:
             typer.echo(f"No signal: '{refused.name}' {refused.reason}")
+        for note in found.notes:
+            typer.echo(f"Note: {note}")
         typer.echo(f'\nFor a campaign with model = "{found.model}":\n\n{found.proposal}', nl=False)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import ContextVar
 from pathlib import Path
@@ -30,6 +30,10 @@ from rigsight.records.record import Floats
 _LISTED = 30
 """Channels that a message lists; a logger may record thousands."""
 _OWN_AXIS = "its own time axis"
+_UNITS_OF_TIME = (1.0, 1e-3, 1e-6, 1e-9)
+"""In which computers count time [s]."""
+_ALIKE = 0.05
+"""Relative difference between two clocks of one device: less than any two units of time."""
 _last_file: ContextVar[dict[Any, Columns] | None] = ContextVar("last file", default=None)
 
 
@@ -171,6 +175,8 @@ class _Selection:
         # As the file has them: a number behind a name would hide its unit.
         self._names = [channel.label for channel in file.channels]
         self._axes: dict[TimeAxis, Clock] = {}
+        self._units: dict[int, float] = {}
+        """Number of a time without a unit -> its unit [s], by the stamps that the file keeps beside it."""
         self.found = {
             signal: number
             for signal, mapping in columns.items()
@@ -312,7 +318,26 @@ class _Selection:
             time = self._file.channels[numbers[0]].group if foreign else ""
             if channel.axis is not None and time and not f"{channel.group}/".startswith(f"{time}/"):
                 possible[signal] = []
+        self._check_by_axes(possible, {*given.values(), *([declared] if time_is_mapped else [])})
         return possible
+
+    def _check_by_axes(self, possible: dict[str, list[int]], mapped: Set[int | None]) -> None:
+        """Leave out what is only called like time: next to stamps of the file, as in a bag, a clock goes as they do."""
+        stamped = []
+        for signal, numbers in possible.items():
+            channel = self._file.channels[self.found[signal]]
+            times = {number: self._file.channels[number] for number in numbers}
+            dated = any(time.unit is not None or time.origin is not None for time in times.values())
+            if channel.axis is None or channel.axis.load is None or dated or mapped & times.keys():
+                continue
+            stamped.append(signal)
+            stamps = _in_seconds(self._path, channel, channel.axis)
+            units = {number: _unit_of_clock(as_stamps(time.load()), stamps) for number, time in times.items()}
+            possible[signal] = [number for number in numbers if units[number] is not None]
+            self._units |= {number: unit for number, unit in units.items() if unit is not None}
+        # The clock of a device and that of the file cannot be compared.
+        if not all(possible[signal] for signal in stamped):
+            possible |= {signal: [] for signal in stamped}
 
     def _declared(self, shown: Mapping[str, list[int]], time_is_mapped: bool) -> int | None:
         """Return the number of the channel that is the time of all signals; None where each has its own."""
@@ -366,7 +391,17 @@ class _Selection:
         if self._file.lines is not None:
             given = np.flatnonzero(~(np.isnan(stamps) & np.isnan(stamps if samples is None else samples)))
             stamps = stamps[: int(given[-1]) + 1 if given.size else 0]
+        if number in self._units:
+            return Clock(channel.name, self._units[number] * stamps, "s")
         return Clock(channel.name, stamps, channel.unit, channel.origin)
+
+
+def _unit_of_clock(clock: Floats, stamps: Floats) -> float | None:
+    """Return the unit [s] in which a clock counts, by stamps [s] of the same moments; None where it is no clock."""
+    if clock.size != stamps.size or not increases(clock):
+        return None
+    ratio = np.ptp(stamps) / np.ptp(clock)
+    return next((unit for unit in _UNITS_OF_TIME if abs(ratio / unit - 1.0) < _ALIKE), None)
 
 
 def _in_seconds(path: Path, channel: Channel, axis: TimeAxis) -> Floats:

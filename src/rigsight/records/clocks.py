@@ -24,12 +24,20 @@ def is_time(name: str) -> bool:
     return closeness(name, TIME) >= _NAMED
 
 
-def own_clocks(names: Sequence[str]) -> Mapping[int, int]:
-    """Return the number of each channel -> the number of the time that is its own, where a file shows that; else without it."""
+def is_prefixed_time(name: str) -> bool:
+    """Return True if a channel is called like time and what it belongs to, as ``t_shoulder``; a temperature may be as well."""
+    return _parts(name)[1].startswith("t ")
+
+
+def own_clocks(names: Sequence[str], further: Sequence[int] = ()) -> Mapping[int, int]:
+    """Return the number of each channel -> the number of the time that is its own, where a file shows that; else without it.
+
+    `further` are times that are known by more than their names.
+    """
     # A file shows it by names (``Time Force`` beside ``Force``), by groups (a time in the group of a channel, or in the nearest
     # one around it), or by order (columns of time of one name, each in front of its signals). One time alone belongs to no one in
     # particular.
-    times = [number for number, name in enumerate(names) if is_time(name)]
+    times = [number for number, name in enumerate(names) if is_time(name) or number in further]
     named = _by_name(names)
     if len(set(times) | set(named.values())) < 2:
         return {}
@@ -79,7 +87,10 @@ def _nearest(names: Sequence[str], times: Sequence[int], number: int, name: str)
 
 
 def _in_front(names: Sequence[str], times: Sequence[int], number: int) -> int | None:
-    called = {_parts(names[time])[1].rstrip("0123456789 ") for time in times}
+    called = {
+        "t " if is_prefixed_time(names[time]) else _parts(names[time])[1].rstrip("0123456789 ")
+        for time in times
+    }
     apart = all(after - before > 1 for before, after in zip(times, [*times[1:], len(names)], strict=True))
     if len(called) > 1 or not apart or number < times[0]:
         return None

@@ -87,6 +87,8 @@ class _Settings:
         self.without_field: list[str] = []
         joints, gears = robot.model.actuator_trnid[:, 0], robot.model.actuator_gear[:, 0]
         drives = {drive: index for drive, index in robot.draft.drives.items() if index >= 0}
+        self._gains: set[str] = set()
+        """Names of what `add_gains` added."""
         self._drives = {drive: (int(joints[i]), float(gears[i]), i) for drive, i in drives.items()}
 
     def _add(self, joint: int, setting: str, value: float) -> None:
@@ -100,13 +102,14 @@ class _Settings:
                 if name in self._model.values:
                     self.of_joints[joint][setting] = gear**2 * self._model.values[name]
                     self.written.append(f"{setting} of {drive}")
+                    self._gains.add(name)
 
     def add_numbers(self) -> None:
         known = self._draft.tables.get("constants", {})
         for name, value in self._model.values.items():
             field = self._draft.fields.get(name, (_NO_FIELD,))[0]
             at = (field.element, field.attribute)
-            if at == _FORCE_RANGE:
+            if at == _FORCE_RANGE or name in self._gains:
                 continue
             if at in _FIELDS and not field.entry:
                 for setting in _FIELDS[at]:

@@ -70,6 +70,7 @@ class Inspection:
     model: str  # the rig that matches the channels best
     proposal: str  # ``[[records]]`` entry, with what must be checked as comments
     n_blanks: int  # values that are left to be filled in there
+    notes: tuple[str, ...] = ()  # what was assumed of the file's layout, or what is missing of it
 
     def to_json(self) -> dict[str, Any]:
         """Return the contents for JSON."""
@@ -80,6 +81,7 @@ class Inspection:
             "channels": self.channels,
             "times": {name: {"step": step, "n_gaps": gaps} for name, (step, gaps) in self.times.items()},
             "refused": self.refused,
+            "notes": self.notes,
             "proposal": {"model": self.model, "toml": self.proposal, "n_blanks": self.n_blanks},
         }
         return json_data(content)
@@ -104,6 +106,7 @@ def run_inspect(path: str | Path, own_rigs: Iterable[Rig] = ()) -> Inspection:
         proposal.guess.rig.name,
         proposal.toml("estimation", '"validation" for records that are only scored'),
         proposal.n_blanks,
+        file.notes,
     )
 
 

@@ -41,3 +41,15 @@ def test_a_way_that_never_moves_has_no_line() -> None:
     still = [Run(np.ones(300), np.random.default_rng(0).standard_normal(300), DT)]
     assert position_lines(law, still, lambda omega: np.ones(omega.size, dtype=complex)) == []
     assert position_lines(law, [], lambda omega: np.ones(omega.size, dtype=complex)) == []
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e200, np.finfo(float).max])
+def test_a_run_that_diverges_has_no_line(bad: float) -> None:
+    def answer(omega: np.ndarray) -> np.ndarray:
+        return -1.0 / (omega**2 + 0j)
+
+    first, second = runs(31.0, np.random.default_rng(2))
+    diverged = Run(first.way, np.where(T > 20.0, bad, first.remainder), DT)
+    lost = Run(np.where(T > 20.0, np.nan, first.way), first.remainder, DT)
+    assert position_lines(law, [diverged, lost], answer) == []
+    assert position_lines(law, [diverged, second, lost], answer) == position_lines(law, [second], answer)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,12 @@ import pytest
 START = 1_700_000_000_000_000_000
 
 
-def bag(path: Path, messages: Any) -> Path:
-    """Write messages (topic, type, received [ns], fields) into an MCAP file."""
+def bag(path: Path, messages: Any, definitions: Mapping[str, str] | None = None) -> Path:
+    """Write messages (topic, type, received [ns], fields) into an MCAP file, also of types that are defined here."""
     rosbag2, typesys = pytest.importorskip("rosbags.rosbag2"), pytest.importorskip("rosbags.typesys")
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    for name, fields_of_it in (definitions or {}).items():
+        store.register(typesys.get_types_from_msg(fields_of_it, name))
 
     def built(kind: str, fields: dict[str, Any]) -> Any:
         return store.types[kind](**fields)

@@ -169,3 +169,22 @@ def test_channels_are_found_by_joint_and_quantity(
     rig = draft_rig(mujoco.MjModel.from_xml_string(ARM.format(elbow=elbow)), "robot").rig
     found = [guess.channel for guess in guess_file(of_file, [rig], is_log=True).signals]
     assert [None if channel is None else channel.name for channel in found] == [*commands, *readings]
+
+
+@pytest.mark.parametrize("effort", [0.0, np.nan])
+@pytest.mark.parametrize("commands", [LISTS[2:], [f"action/effort/{joint}" for joint in JOINTS]])
+def test_what_never_changes_is_no_command_beside_one_that_moves(effort: float, commands: list[str]) -> None:
+    wave = np.sin(np.arange(10.0))
+
+    def channel(name: str) -> Channel:
+        samples = np.full(10, effort) if name.startswith("joint_states/effort") else wave
+        return Channel(name, 10, lambda: samples, axis=TimeAxis(10, 0.01))
+
+    rig = draft_rig(
+        mujoco.MjModel.from_xml_string(
+            ARM.format(elbow="motor").replace("position name", "motor name").replace('kp="25" kv="0.5"', "")
+        ),
+        "robot",
+    ).rig
+    guess = guess_file([channel(name) for name in (*STATES, *commands)], [rig], is_log=True)
+    assert [one.channel and one.channel.name for one in guess.signals[:2]] == commands

@@ -58,7 +58,7 @@ class Line:
 def position_lines(law: Law, runs: Sequence[Run], response: Answer, count: int = 2) -> list[Line]:
     """Return the lines that explain most, best first."""
     share = max(SEARCH.most_wave_samples // max(len(runs), 1), 64)
-    runs = [_liveliest(run, share) for run in runs]
+    runs = [_liveliest(run, share) for run in runs if _is_finite(run)]
     spans = [float(np.ptp(run.way)) for run in runs]
     span = max(spans, default=0.0)
     steps = np.concatenate([np.abs(np.diff(run.way)) for run in runs]) if runs else np.zeros(0)
@@ -114,6 +114,12 @@ def _line(law: Law, spectra: Sequence[_Spectrum], wave_number: float) -> Line:
     found = np.linalg.lstsq(np.atleast_2d(normal), np.atleast_1d(gradient), rcond=None)[0]
     share = float(found @ np.atleast_1d(gradient)) / total if total > 0.0 else 0.0
     return Line(wave_number, tuple(map(float, found)), share)
+
+
+def _is_finite(run: Run) -> bool:
+    """Return False for the residual of a model that diverges, also where only its square exceeds all numbers."""
+    with np.errstate(over="ignore"):
+        return bool(np.isfinite(run.way).all() and np.isfinite(np.sum(run.remainder**2)))
 
 
 def _liveliest(run: Run, n_samples: int) -> Run:

@@ -26,7 +26,7 @@ def open_ulog(path: Path) -> Iterator[ChannelFile]:
     with contextlib.redirect_stdout(io.StringIO()):
         log = ULog(str(path))
     found = listed(path.name, _parts(log))
-    cut = "the log is cut short or damaged; what was written before that is read"
+    cut = f"{path.name}: the log is cut short or damaged; what was written before that is read."
     yield replace(found, notes=(cut,)) if log.file_corruption else found
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -212,6 +212,7 @@ class TextColumns:
                 "Correct the file, or cut the record there."
             )
         channels: list[Channel] = []
+        labels: list[str] = []
         refused: list[Refused] = []
         for i, (name, column) in enumerate(zip(layout.names, self._all().T, strict=True)):
             if np.isnan(column).all():
@@ -223,7 +224,10 @@ class TextColumns:
             own = bool(name) and (layout.names.count(name) == 1 or is_time(name))
             load = partial(np.asarray, column)
             channels.append(Channel(name if own else str(i + 1), n_rows, load, layout.unit(i)))
-        return ChannelFile(with_distinct_names(channels), tuple(refused), "delimited text")
+            labels.append(str(i + 1) if layout.names.count(name) > 1 else "")
+        named = zip(with_distinct_names(channels), labels, strict=True)
+        distinct = tuple(replace(one, label=label or one.label) for one, label in named)
+        return ChannelFile(distinct, tuple(refused), "delimited text")
 
     def _all(self) -> Floats:
         """Return all columns, shape (n_rows, n_columns)."""

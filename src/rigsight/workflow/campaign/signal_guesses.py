@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cache
 
+import numpy as np
+
+from rigsight.errors import InputError
 from rigsight.records.channel_names import closeness, is_command, may_be_command, may_be_reading, split_unit
 from rigsight.records.channel_units import DRIVES, has_si, is_a
-from rigsight.records.clocks import own_clocks
-from rigsight.records.formats.channel import Channel
+from rigsight.records.clocks import increases, is_prefixed_time, own_clocks
+from rigsight.records.formats.channel import Channel, as_floats
 from rigsight.records.read_record import TIME
 from rigsight.records.signals import REFERENCE
 from rigsight.rigs import Rig, rotational
@@ -43,7 +48,8 @@ class Guess:
 class FileGuess:
     """What the channels of a file probably are, for one rig.
 
-    Where signals have clocks of their own, `times` are their names, and `clocks` those of the signals that are known.
+    Where signals have clocks of their own, `times` are their names, and `clocks` what a campaign calls those of the
+    signals that are known.
     """
 
     rig: Rig
@@ -73,12 +79,20 @@ def guess_file(
 
     In the log of a robot commands and readings have groups that are called so.
     """
-    own = own_clocks([channel.name for channel in channels])
+    rise = [
+        number
+        for number, channel in enumerate(channels)
+        if is_prefixed_time(channel.name) and _rises(channel)
+    ]
+    own = own_clocks([channel.name for channel in channels], rise)
     times = [channels[number] for number in set(own.values())]
-    guesses = [_guess_rig(rig, channels, rising, times, is_log) for rig in rigs]
+    moves = cache(_moves)
+    guesses = [_guess_rig(rig, channels, rising, times, moves, is_log) for rig in rigs]
     found = min(guesses, key=_unlikely)
     other = rotational(found.rig)
-    in_units = [found] if other is None else [found, _guess_rig(other, channels, rising, times, is_log)]
+    in_units = (
+        [found] if other is None else [found, _guess_rig(other, channels, rising, times, moves, is_log)]
+    )
     in_units = [replace(one, reference=_guess_reference(one, channels)) for one in in_units]
     in_units = [replace(one, signals=_completed_by_unit(one, channels, times)) for one in in_units]
 
@@ -99,13 +113,17 @@ def _with_clocks(found: FileGuess, channels: Sequence[Channel], own: Mapping[int
     }
     # A channel that is yet to be filled in has the time of its own as well.
     mapped = [one for one in found.signals if one.channel is not None]
+    axes = [c.axis for c in [one.channel for one in mapped if one.channel is not None] or channels]
+    if axes and all(axis is not None and axis.load is not None for axis in axes):
+        # Beside stamps of the file, reading finds out what is a clock.
+        return replace(found, time=Guess(TIME, "s"), times=frozenset(channels[i].name for i in own.values()))
     free = set(range(len(channels))) - own.keys() - set(own.values())
     if not own or len(clocks) < len(mapped) or (not mapped and free):
         return found
     if len(mapped) == len(found.signals) and len({id(clock) for clock in clocks.values()}) == 1:
         clock = next(iter(clocks.values()))
         return replace(found, time=Guess(TIME, "s", clock, _unit_of(clock), clock.unit is not None))
-    named = {signal: clock.name for signal, clock in clocks.items()}
+    named = {signal: clock.label for signal, clock in clocks.items()}
     return replace(
         found, time=Guess(TIME, "s"), clocks=named, times=frozenset(channels[i].name for i in own.values())
     )
@@ -194,6 +212,7 @@ def _guess_rig(
     channels: Sequence[Channel],
     rising: Channel | None,
     times: Sequence[Channel],
+    moves: Callable[[Channel], bool],
     is_log: bool,
 ) -> FileGuess:
     time, _ = _guess(TIME, "s", channels, ())
@@ -202,21 +221,30 @@ def _guess_rig(
     taken = [*times, *([time.channel] if time.channel is not None else [])]
     signals, names = (*rig.inputs, *rig.outputs), _names_of(rig)
     found, score = {}, 0.0
-    # Signals with a clear name come first, so that no other signal takes their channel.
-    for signal in sorted(
-        signals, key=lambda s: -max((_closeness(c, names[s.name]) for c in channels), default=0.0)
-    ):
-        suits = may_be_command if signal in rig.inputs else may_be_reading
-        suited = [
+    suited: dict[str, list[Channel]] = {}
+    first: dict[str, list[Channel]] = {}
+    for signal in signals:
+        called, suits = names[signal.name], may_be_command if signal in rig.inputs else may_be_reading
+        suited[signal.name] = [
             c for c in channels if not is_log or c.short_name == signal.name or suits(c.name, signal.unit)
         ]
-        guess, closest = _guess(signal.name, signal.unit, suited, taken, names[signal.name])
+        # What never changes drove nothing, as the efforts of a robot without sensors for them, unless nothing else is called so.
+        clear = [c for c in suited[signal.name] if signal in rig.inputs and _closeness(c, called) >= _CLEAR]
+        first[signal.name] = [c for c in clear if len(clear) > 1 and moves(c)] or suited[signal.name]
+    # Signals with a clear name come first, so that no other signal takes their channel.
+    for signal in sorted(
+        signals, key=lambda s: -max((_closeness(c, names[s.name]) for c in first[s.name]), default=0.0)
+    ):
+        for possible in (first[signal.name], suited[signal.name]):
+            guess, closest = _guess(signal.name, signal.unit, possible, taken, names[signal.name])
+            if guess.is_clear:
+                break
         if guess.channel is not None:
             taken.append(guess.channel)
             score += closest
         found[signal.name] = guess
     if is_log:
-        found |= _commands_in_order([found[signal.name] for signal in rig.inputs], channels)
+        found |= _commands_in_order([found[signal.name] for signal in rig.inputs], channels, moves)
     return FileGuess(rig, time, tuple(found[signal.name] for signal in signals), score / len(signals))
 
 
@@ -238,7 +266,26 @@ def _closeness(channel: Channel, names: Sequence[str]) -> float:
     return max(closeness(channel.name, name) for name in names)
 
 
-def _commands_in_order(inputs: Sequence[Guess], channels: Sequence[Channel]) -> dict[str, Guess]:
+def _moves(channel: Channel) -> bool:
+    """Return True if a channel takes several finite values."""
+    with suppress(InputError):
+        samples = as_floats(channel.load())
+        samples = samples[np.isfinite(samples)]
+        return bool(np.any(samples != samples[:1]))
+    return False
+
+
+def _rises(channel: Channel) -> bool:
+    """Return True if a channel increases up to its end, behind which the cells of a text may be blank."""
+    with suppress(InputError):
+        samples = as_floats(channel.load())
+        return increases(samples[: samples.size - int(np.argmax(np.isfinite(samples[::-1])))])
+    return False
+
+
+def _commands_in_order(
+    inputs: Sequence[Guess], channels: Sequence[Channel], moves: Callable[[Channel], bool]
+) -> dict[str, Guess]:
     """Return the inputs as the entries of the only list of commands without names that has as many; empty if there is none."""
     lists: dict[str, list[Channel]] = {}
     units = {own.si for own in inputs}
@@ -247,7 +294,10 @@ def _commands_in_order(inputs: Sequence[Guess], channels: Sequence[Channel]) -> 
         if channel.short_name.isdecimal() and is_command(channel.name) and suits:
             lists.setdefault(channel.group, []).append(channel)
     fitting = [own for own in lists.values() if len(own) == len(inputs)]
-    if len(fitting) != 1 or any(own.is_clear for own in inputs):
+    found = [own.channel for own in inputs if own.channel is not None]
+    moving = [own for own in fitting if any(map(moves, own))]
+    fitting = moving if moving or found else fitting
+    if len(fitting) != 1 or any(map(moves, found)):
         return {}
     ordered = sorted(fitting[0], key=lambda channel: int(channel.short_name))
     return {
