@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _NAME_WIDTH = 16
 """Of the columns of names, at least, where they are as long."""
-_MOST_ROWS = 16
+_MOST_ROWS = 12
 """Of the table of effects: that of a rig with several joints would be longer than a screen, and the page has it."""
 
 
