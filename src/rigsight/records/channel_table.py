@@ -11,18 +11,19 @@ from typing import Any
 import numpy as np
 
 from rigsight.errors import InputError, nearest
-from rigsight.records.channel_units import UnknownUnitError, factor
 from rigsight.records.clocks import (
     Clock,
+    in_seconds,
     increases,
     possible_clocks,
     refuse_one_dt,
     shared_clock,
     side_by_side,
+    unit_of_clock,
     with_clocks,
 )
 from rigsight.records.column_mapping import TIME, ColumnMapping, Columns
-from rigsight.records.formats.channel import Channel, ChannelFile, TimeAxis, as_floats, as_stamps
+from rigsight.records.formats.channel import ChannelFile, TimeAxis, as_floats, as_stamps
 from rigsight.records.formats.channel_file import file_format, open_channels
 from rigsight.records.formats.text_channels import TextColumns
 from rigsight.records.record import Floats
@@ -30,10 +31,6 @@ from rigsight.records.record import Floats
 _LISTED = 30
 """Channels that a message lists; a logger may record thousands."""
 _OWN_AXIS = "its own time axis"
-_UNITS_OF_TIME = (1.0, 1e-3, 1e-6, 1e-9)
-"""In which computers count time [s]."""
-_ALIKE = 0.05
-"""Relative difference between two clocks of one device: less than any two units of time."""
 _last_file: ContextVar[dict[Any, Columns] | None] = ContextVar("last file", default=None)
 
 
@@ -331,8 +328,8 @@ class _Selection:
             if channel.axis is None or channel.axis.load is None or dated or mapped & times.keys():
                 continue
             stamped.append(signal)
-            stamps = _in_seconds(self._path, channel, channel.axis)
-            units = {number: _unit_of_clock(as_stamps(time.load()), stamps) for number, time in times.items()}
+            stamps = in_seconds(self._path, channel, channel.axis)
+            units = {number: unit_of_clock(as_stamps(time.load()), stamps) for number, time in times.items()}
             possible[signal] = [number for number in numbers if units[number] is not None]
             self._units |= {number: unit for number, unit in units.items() if unit is not None}
         # The clock of a device and that of the file cannot be compared.
@@ -372,7 +369,7 @@ class _Selection:
             assert channel is not None
             assert channel.axis is not None
             if channel.axis not in self._axes:
-                stamps = _in_seconds(self._path, channel, channel.axis)
+                stamps = in_seconds(self._path, channel, channel.axis)
                 self._axes[channel.axis] = Clock(_OWN_AXIS, stamps, "s", channel.axis.origin)
             return self._axes[channel.axis]
         chosen = next((clock for clock in tried if increases(clock.stamps)), tried[-1])
@@ -394,22 +391,3 @@ class _Selection:
         if number in self._units:
             return Clock(channel.name, self._units[number] * stamps, "s")
         return Clock(channel.name, stamps, channel.unit, channel.origin)
-
-
-def _unit_of_clock(clock: Floats, stamps: Floats) -> float | None:
-    """Return the unit [s] in which a clock counts, by stamps [s] of the same moments; None where it is no clock."""
-    if clock.size != stamps.size or not increases(clock):
-        return None
-    ratio = np.ptp(stamps) / np.ptp(clock)
-    return next((unit for unit in _UNITS_OF_TIME if abs(ratio / unit - 1.0) < _ALIKE), None)
-
-
-def _in_seconds(path: Path, channel: Channel, axis: TimeAxis) -> Floats:
-    try:
-        scale = factor(axis.unit, "s")
-    except UnknownUnitError as error:
-        raise InputError(
-            f"{path.name}, channel '{channel.name}': the unit '{axis.unit}' of its time axis {error}. Export it over seconds."
-        ) from None
-    stamps = axis.stamps()
-    return stamps if scale == 1.0 else scale * stamps

@@ -11,11 +11,17 @@ import numpy as np
 
 from rigsight.errors import InputError
 from rigsight.records.channel_names import NAMES_OF, closeness, plain_words
+from rigsight.records.channel_units import UnknownUnitError, factor
 from rigsight.records.column_mapping import TIME, Columns
+from rigsight.records.formats.channel import Channel, TimeAxis
 from rigsight.records.record import Floats
 from rigsight.records.stamps import seconds_since
 
 _NAMED = 2.0
+_UNITS_OF_TIME = (1.0, 1e-3, 1e-6, 1e-9)
+"""In which computers count time [s]."""
+_ALIKE = 0.05
+"""Relative difference between two clocks of one device: less than any two units of time."""
 _WORDS_OF_TIME = tuple(sorted(NAMES_OF[TIME], key=len, reverse=True))
 
 
@@ -113,6 +119,26 @@ def possible_clocks(
 def increases(stamps: Floats) -> bool:
     """Return True if numbers can be the stamps of a clock, shape (n_samples,)."""
     return stamps.size > 1 and bool(np.all(np.diff(stamps) > 0.0))
+
+
+def in_seconds(path: Path, channel: Channel, axis: TimeAxis) -> Floats:
+    """Return the stamps [s] of the own axis of a channel, shape (n_samples,)."""
+    try:
+        scale = factor(axis.unit, "s")
+    except UnknownUnitError as error:
+        raise InputError(
+            f"{path.name}, channel '{channel.name}': the unit '{axis.unit}' of its time axis {error}. Export it over seconds."
+        ) from None
+    stamps = axis.stamps()
+    return stamps if scale == 1.0 else scale * stamps
+
+
+def unit_of_clock(clock: Floats, stamps: Floats) -> float | None:
+    """Return the unit [s] in which a clock counts, by stamps [s] of the same moments; None where it is no clock."""
+    if clock.size != stamps.size or not increases(clock):
+        return None
+    ratio = np.ptp(stamps) / np.ptp(clock)
+    return next((unit for unit in _UNITS_OF_TIME if abs(ratio / unit - 1.0) < _ALIKE), None)
 
 
 @dataclass(frozen=True, eq=False)
