@@ -23,8 +23,7 @@ from rigsight.app.page_parts import (
 )
 from rigsight.app.steps import OWN_EFFECTS, ROBOT_SUFFIXES, Site, inspection_key, picture_of
 from rigsight.app.workspace import inside, set_aside
-from rigsight.records.formats.known import LARGEST_FILE
-from rigsight.workflow.init import MEASURED_SUFFIXES
+from rigsight.records.formats.known import LARGEST_FILE, MEASURED_SUFFIXES
 
 _UPLOAD = (Path(__file__).parent / "upload.js").read_text(encoding="utf-8")
 _FURTHER = {

@@ -99,12 +99,12 @@ def with_offsets(
     """Return remarks with the sensors whose mean residual of a rough fit, by record or window, differs between records."""
     units = {signal.name: signal.unit for signal in rig.outputs}
     differing = differing_means([record.origin for record in records], records, residuals, list(units))
-    # Means that differ by more than the motion are told already.
-    told = {one.signal for one in found if one.remedy == OFFSETS_MEND}
+    # Means that differ by more than the motion are reported already.
+    reported = {one.signal for one in found if one.remedy == OFFSETS_MEND}
     offsets = [
         Remark("warning", one.sentence(units[one.output]), OFFSETS_MEND, signal=one.output)
         for one in differing
-        if one.output not in told
+        if one.output not in reported
     ]
     return by_gravity([*found, *offsets])
 

@@ -101,7 +101,7 @@ def family_label(own: FamilyAtPlace | ProposedCause) -> str:
 
 
 def forms_label(own: FamilyAtPlace) -> str:
-    """Return the forms of a family with their probabilities, none at 0 %: ``"Stribeck friction 60 %, viscous drag 40 %"``."""
+    """Return the forms of a family with their probabilities above 0 %: ``"Stribeck friction 60 %, Coulomb friction 40 %"``."""
     shown = ((effects_label(form.effects), percent(form.probability)) for form in own.forms[:_FORMS])
     return ", ".join(f"{form} {probability}" for form, probability in shown if probability != percent(0.0))
 

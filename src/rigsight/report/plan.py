@@ -67,14 +67,14 @@ def plan_headline(plan: Plan) -> str:
 def promise(plan: Plan) -> str:
     """Return what to expect afterwards."""
     trials = plan.trials
-    told = ""
+    remark = ""
     # No probability exceeds that of a verdict, so that one which is high already hardly gains.
     if plan.now >= DECIDED:
-        told = "The records decide between these rivals already. "
+        remark = "The records decide between these rivals already. "
     elif plan.promised <= plan.now + _GAIN and trials.decided <= _MOSTLY:
-        told = "No record within these limits tells these rivals apart. "
+        remark = "No record within these limits tells these rivals apart. "
     return (
-        f"{told}"
+        f"{remark}"
         f"Expected probability of the cause: {plan.now:.2f} now, {plan.promised:.2f} afterwards. "
         f"In {trials.n} simulated outcomes the cause was the most probable in {percent(trials.right)}, "
         f"decided in {percent(trials.decided)}, wrongly in {percent(trials.wrong)}."

@@ -76,7 +76,7 @@ def run_diagnose(
     folder, check = Path(out), check_of(read, effects, listener)
     # Whoever reads that a record is faulty, or was not read as meant, need not wait for the verdict.
     follows = [note.removeprefix(WARNING) for note in read.notes]
-    report_notes((told for told in check.before_a_fit if told not in follows), listener)
+    report_notes((note for note in check.before_a_fit if note not in follows), listener)
 
     def keep(diagnosis: Diagnosis) -> None:
         made_from = origin(read, diagnosis, called, folder, by)

@@ -40,7 +40,7 @@ from rigsight.workflow.differing import (
     unit_of_records,
     with_effects_of,
 )
-from rigsight.workflow.identification.joint import motion_left
+from rigsight.workflow.identification.joint import beyond_noise
 from rigsight.workflow.identification.rig import identify_rig
 from rigsight.workflow.run.kernels import checked_jobs
 from rigsight.workflow.run.progress import Listener, silent
@@ -125,7 +125,7 @@ class Difference:
             if others
             else ""
         ) + scatter
-        lacking = [f"{unit.left} ({unit.name})" for unit in self.units if unit.left]
+        lacking = [f"{unit.remainder} ({unit.name})" for unit in self.units if unit.remainder]
         if lacking:
             besides += (
                 f" The equations leave {', '.join(lacking)}, more than noise: an effect may have changed which they lack. Run "
@@ -230,8 +230,10 @@ def _units(
     for path, campaign in read.items():
         whole = with_effects_of(campaign, models)
         identified = identify_rig(whole, EstimationOptions(), jobs, listener)
-        left = motion_left(identified.joint.scores, whole.estimation)
-        found[path] = replace(unit_of_records(str(path), whole, identified), left=next(iter(left), ""))
+        remainders = beyond_noise(identified.joint.scores, whole.estimation)
+        found[path] = replace(
+            unit_of_records(str(path), whole, identified), remainder=next(iter(remainders), "")
+        )
     return [found[path] for path in paths]
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from rigsight.errors import InputError, check_option, readable
 from rigsight.records import Role
 from rigsight.records.channel_table import open_measurement
-from rigsight.records.formats.known import BY_SUFFIX
+from rigsight.records.formats.known import MEASURED_SUFFIXES
 from rigsight.rigs import RIGS, Rig
 from rigsight.robots import FreeRun, RigDraft, free_run, read_robot, rig_text, with_gears
 from rigsight.workflow.campaign.campaign_file import MOST_RECORDS
@@ -28,7 +28,6 @@ from rigsight.workflow.run.results import write_together
 
 CAMPAIGN_FILE = "campaign.toml"
 
-MEASURED_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", *BY_SUFFIX)
 _SCORED = re.compile(r"valid|verif|test|check|pruef|prüf|score", re.IGNORECASE)
 
 

@@ -39,7 +39,9 @@ def test_the_toml_file_may_be_named_instead_of_its_folder(campaign: Callable[...
 
 def test_a_measured_file_is_no_campaign(campaign: Callable[..., Path]) -> None:
     measured = next(campaign().glob("*.csv"))
-    with pytest.raises(InputError, match=rf"{measured.name} is not a campaign\.toml.*rigsight init"):
+    with pytest.raises(
+        InputError, match=rf"{measured.name} is a measured file, not a campaign.*rigsight init"
+    ):
         read_campaign(measured)
 
 

@@ -76,6 +76,8 @@ FORMATS = (
     ),
 )  # fmt: skip
 BY_SUFFIX = {suffix: known for known in FORMATS for suffix in known.suffixes}
+MEASURED_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", *BY_SUFFIX)
+"""Of files that are taken for measured ones, those of delimited text first."""
 
 LOGS = frozenset(known.name for known in FORMATS if known.extra == "logs")
 """Names of the formats that robots alone log in."""

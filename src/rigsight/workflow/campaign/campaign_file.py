@@ -13,6 +13,7 @@ from rigsight.effects import Effect
 from rigsight.errors import InputError, nearest, shown
 from rigsight.parameters import Parameter
 from rigsight.records import Hold, Kind, Role
+from rigsight.records.formats.known import MEASURED_SUFFIXES
 from rigsight.rigs import Rig
 from rigsight.rigs.reading.toml_places import Place, toml_tables, value_places
 from rigsight.simulate import Structure, compose
@@ -116,10 +117,10 @@ def locate(campaign: Path) -> Path:
     if not campaign.exists():
         raise InputError(f"{campaign} does not exist; name a campaign.toml or the folder that contains it.")
     if not campaign.is_dir():
-        if campaign.suffix.lower() not in {".toml", ""}:
+        if campaign.suffix.lower() in MEASURED_SUFFIXES:
             raise InputError(
-                f"{campaign.name} is not a campaign.toml. Name that file, or its folder; 'rigsight init {campaign.parent}' "
-                "makes a draft from the measured files there."
+                f"{campaign.name} is a measured file, not a campaign. Name its campaign.toml, or the folder; "
+                f"'rigsight init {campaign.parent}' makes a draft."
             )
         return campaign
     path = campaign / "campaign.toml"

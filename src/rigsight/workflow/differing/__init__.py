@@ -54,8 +54,8 @@ class Unit:
     numbers: Mapping[str, Known]
     units: Mapping[str, str]
     roles: Mapping[str, Role | Family]  # of each number in the equations, the family for one of an effect
-    # What its equations leave of its records beyond noise at the most, in words; empty where nothing is, or for a diagnosis.
-    left: str = ""
+    # Largest error of its equations in one record, in words; empty where it is noise, and for a diagnosis.
+    remainder: str = ""
 
     @property
     def has_one_record(self) -> bool:

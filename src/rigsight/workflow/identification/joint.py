@@ -163,23 +163,23 @@ def _leaves_motion(relative: float, samples: Floats) -> bool:
     return relative > _SMALL_LOSS and relative * float(np.std(samples)) > MISFIT * roughness(samples)
 
 
-def motion_left(scores: Sequence[RecordScore], fitted: Sequence[Record]) -> list[str]:
+def beyond_noise(scores: Sequence[RecordScore], fitted: Sequence[Record]) -> list[str]:
     """Return what the joint model leaves of each output of the fitted records beyond noise, in words, the most first."""
     return _errors(scores, fitted, _leaves_motion)
 
 
 def _errors(
-    scores: Sequence[RecordScore], fitted: Sequence[Record], is_told: Callable[[float, Floats], bool]
+    scores: Sequence[RecordScore], fitted: Sequence[Record], is_reported: Callable[[float, Floats], bool]
 ) -> list[str]:
     by_name = {record.name: record for record in fitted}
-    told = [
+    found = [
         (error, f"{gap_percent(error)} of {name} in '{score.record}'")
         for score in scores
         if score.role == "estimation"
         for name, error in score.nrmse.items()
-        if is_told(error, by_name[score.record][name])
+        if is_reported(error, by_name[score.record][name])
     ]
-    return [words for _, words in sorted(told, reverse=True)]
+    return [words for _, words in sorted(found, reverse=True)]
 
 
 def _statement(fit: JointFit, scores: Sequence[RecordScore], fitted: Sequence[Record]) -> str:
@@ -200,7 +200,7 @@ def _statement(fit: JointFit, scores: Sequence[RecordScore], fitted: Sequence[Re
         return "There is no parameter that every record determines, so the records cannot be compared."
     if fit.probability >= _DIFFERENT:
         agree = f"equally large differences arise by chance with probability {fit.probability:.2g}"
-        left = motion_left(scores, fitted)
+        left = beyond_noise(scores, fitted)
         if not left:
             return f"One parameter set fits all {len(fitted)} estimation records: {agree}."
         return (
