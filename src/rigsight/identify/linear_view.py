@@ -57,6 +57,11 @@ class LinearView:
     # Contribution of a held input to the measured response, shape (n,), by (source, response); none for a prescribed motion.
     images: Mapping[tuple[str, str], NDArray[np.complex128]]
 
+    @property
+    def has_responses(self) -> bool:
+        """True if there is a measured frequency response; steps give none."""
+        return self.measured is not None and bool(self.measured.found)
+
     def misfit(self, source: str, response: str) -> float:
         """Return the difference between model and measured response relative to the noise; 1 if noise explains it."""
         # This is the median over frequencies, because values at the ends of a band may be far off.

@@ -44,7 +44,7 @@ def render_check(found: Check, command: str, versions: Mapping[str, str]) -> str
         check=found,
         n_faults=severities.count("fault"),
         n_warnings=severities.count("warning"),
-        n_determined=sum(p.status == "determined" for p in found.parameters),
+        n_determined=sum(p.status in ("determined", "weak") for p in found.parameters),
         rivals=list(rivals(found.matrix)),
         forms=list(forms(found.matrix)),
         heads=[short_label(found.matrix, i) for i in range(len(found.matrix.effects))],

@@ -285,7 +285,7 @@ def _estimates(
 def _figures(views: Sequence[LinearView], drawings: Sequence[Figure]) -> Iterator[PageFigure | None]:
     remaining = iter(drawings)
     for number, view in enumerate(views, 1):
-        if view.measured is None:
+        if view.measured is None or not view.has_responses:
             yield None
             continue
         shown = "; ".join(
@@ -296,7 +296,7 @@ def _figures(views: Sequence[LinearView], drawings: Sequence[Figure]) -> Iterato
         yield page_figure(
             next(remaining),
             f"responses-{number}",
-            shown or "No frequency response was measured.",
+            shown,
             "Magnitude and phase of each sensor's response to each input: measured from all records together (gray, with 95 % "
             "bands), and that of the fitted equations, linearized at equilibrium (blue).",
         )

@@ -167,7 +167,7 @@ def write_identification(
     page = {}
     if identification.identifiability is not None:
         drawings = [
-            view_figure(v, identification.units) for v in identification.views if v.measured is not None
+            view_figure(view, identification.units) for view in identification.views if view.has_responses
         ]
         amplitudes = amplitudes_figure(identification)
         page[PAGE_FILE] = render_identification(

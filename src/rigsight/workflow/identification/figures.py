@@ -22,6 +22,7 @@ from rigsight.plot import (
     response_grid,
     svg_text,
 )
+from rigsight.plot.drawing import with_unit
 from rigsight.units import behind
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def identification_figures(identification: Identification) -> dict[str, tuple[st
     found: dict[str, tuple[str, Figure]] = {}
     by_record = _is_by_record(identification)
     for number, view in enumerate(() if by_record else identification.views, 1):
-        if view.measured is not None:
+        if view.has_responses:
             file = RESPONSES_FILE if number == 1 else f"responses_{number}.svg"
             what = (
                 "Responses of every sensor to every input, measured against the linearized model, 95 % bands"
@@ -83,8 +84,8 @@ def responses_figure(identification: Identification) -> Figure | None:
     """Return the magnitudes of all records over each other; None where there are none."""
     # Of a rig of several inputs or sensors it is the grid of their responses, all records together.
     if not _is_by_record(identification):
-        views = [view for view in identification.views if view.measured is not None]
-        return view_figure(views[0], identification.units)
+        views = [view for view in identification.views if view.has_responses]
+        return view_figure(views[0], identification.units) if views else None
     columns = _columns(identification)
     return overlaid_responses(columns) if columns else None
 
@@ -115,8 +116,7 @@ def amplitudes_figure(identification: Identification) -> Figure | None:
         return None
     parameters = _parameters(identification)
     source = identification.records[0].source
-    unit = identification.units.get(source, "")
-    label = f"amplitude of {source}" + (f" [{unit}]" if unit else "")
+    label = with_unit(f"amplitude of {source}", identification.units.get(source, ""))
     return amplitude_dependence(parameters, label) if parameters else None
 
 
