@@ -9,6 +9,8 @@ from rigsight.campaign import Campaign
 from rigsight.diagnose.fit_context import candidates_on
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.inverse import propose, record_motion
+from rigsight.inverse.equation_fit import EquationFit
+from rigsight.inverse.missing_force import forces_along
 from rigsight.records import Record
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
@@ -73,3 +75,13 @@ def test_friction_is_found_beside_the_drift_of_the_integrated_reading(zero: floa
     found = propose(own, {**VALUES, "zero": zero}, candidates_on(PENDULUM, CATALOGUE))
     assert found is not None
     assert found.alone[0].family == "dry_friction"
+
+
+def test_the_missing_force_of_a_motion_that_drifts_has_its_true_size() -> None:
+    motions = [motion for swing in swings() if (motion := record_motion(PENDULUM, swing, VALUES)) is not None]
+    assert all(motion.drifts for motion in motions)
+    (along,) = forces_along(EquationFit(PENDULUM, motions, (), (), VALUES), VALUES, None)
+    force = np.concatenate([motion.some(own) for motion, own in zip(motions, along.force, strict=True)])
+    # Friction of 0.03 N m; the noise of the gyro, differentiated, adds to it.
+    assert 0.02 < float(np.sqrt(np.mean(force**2))) < 0.1
+    assert float(np.corrcoef(force, np.concatenate([m.some(np.sign(m.z[1])) for m in motions]))[0, 1]) > 0.5

@@ -166,7 +166,7 @@ def warnings_of(data: DiscoveryData, stages: Found, terms: Sequence[Term], floor
         )
     found += _still_missing(stages)
     if stages.judged.error_over_noise > BY_NOISE:
-        found += _at_bounds(data.rig, stages.final)
+        found += at_bounds(data.rig, stages.final)
     unknown = [name for name, c in coefficients_of(stages.final).items() if not math.isfinite(c.std)]
     if unknown and data.rig.mechanism.joints[1:]:
         found.append(f"These records do not determine {', '.join(unknown)}.")
@@ -174,7 +174,7 @@ def warnings_of(data: DiscoveryData, stages: Found, terms: Sequence[Term], floor
     return tuple(found)
 
 
-def _at_bounds(rig: Rig, final: FitResult) -> list[str]:
+def at_bounds(rig: Rig, final: FitResult) -> list[str]:
     """Return a warning about each parameter of the rig at a bound, which the terms may have to make up for."""
     found = []
     for p in rig.parameters:
@@ -184,8 +184,8 @@ def _at_bounds(rig: Rig, final: FitResult) -> list[str]:
                 and abs(final.values[p.name] - bound) <= _AT_BOUND * final.standard_errors[p.name]
             ):
                 found.append(
-                    f"{p.name} is at its {side} bound of {bound:.3g}{behind(p.unit)}: terms may stand for a value beyond it. "
-                    "If the rig may have one, as one that is driven by itself, allow it in a rig file of your own."
+                    f"{p.name} is at its {side} bound of {bound:.3g}{behind(p.unit)}: the terms may make up for a value beyond "
+                    "it. If this rig can have one, as a self-excited rig has negative damping, allow it in a rig file."
                 )
     return found
 
