@@ -72,7 +72,7 @@ def has_size_of_zero(model: FittedModel, others: Sequence[FittedModel]) -> bool:
 
 def is_beyond_records(model: FittedModel, context: FitContext) -> bool:
     """Return True if an effect is slower, longer or coarser than the records can show: it is another spring."""
-    # Its wave is longer than the motion in every record, its time constant or period longer than every record [s], or the length
+    # Its wave is longer than the travel of the motion, its time constant or period longer than every record [s], or the length
     # over which it yields beyond its search; or the periods of a tone are too few in each record. A delay must leave the larger
     # part of a record: before, the reading is what it was at the start, whatever the input.
     fit, scales = model.fit, context.scales

@@ -94,7 +94,15 @@ def scales_at_places(rig: Rig, records: Sequence[Record], values: Mapping[str, f
         own_sizes.append(own_size)
         for name, samples in found.items():
             signals.setdefault(name, []).append(samples)
-    joints = {joint.name: _of_joint(joint.name, signals) for joint in rig.mechanism.joints}
+    seen = [
+        sensor.reads for sensor in rig.mechanism.sensors if any(sensor.name in record for record in records)
+    ]
+    shown = {symbol for reads in seen for symbol in reads.free_symbols}
+    free = {coordinate.symbol for coordinate in rig.mechanism.free}
+    joints = {
+        joint.name: _of_joint(joint.name, signals, joint.motion.free_symbols & free <= shown)
+        for joint in rig.mechanism.joints
+    }
     first = next(iter(joints.values()), dict.fromkeys(("x", "travel", "force", "drive", "time"), _UNKNOWN))
     sources = [size_of_signal(signals[f"input {s.name}"]) for s in rig.inputs]
     own_states = [f"value {state.name}" for state in rig.mechanism.states]
@@ -112,7 +120,11 @@ def scales_at_places(rig: Rig, records: Sequence[Record], values: Mapping[str, f
         key = f"reading@{name}" if name in equations.sensor_names else f"value {name}"
         slope = f"slope@{name}" if name in equations.sensor_names else f"change {name}"
         x = size_of_signal(signals[key])
-        own = {"x": x, "travel": _travel(signals[key]), "time": _over(x, size_about_zero(signals[slope]))}
+        own = {
+            "x": x,
+            "travel": _travel(signals[key], is_shown=True),
+            "time": _over(x, size_about_zero(signals[slope])),
+        }
         places[name] = {**plain, **_not_zero(own)}
     scales = dict(plain)
     for place, sizes in places.items():
@@ -169,20 +181,20 @@ def _inertial(
     return own
 
 
-def _of_joint(name: str, signals: _Signals) -> dict[str, float]:
+def _of_joint(name: str, signals: _Signals, is_shown: bool) -> dict[str, float]:
     x = size_of_signal(signals[f"motion@{name}"])
     driven = [key for key in signals if key.endswith(f">{name}")]
     keys = [f"inertia@{name}", f"spring@{name}", f"damper@{name}", f"own@{name}", *driven]
     drive = max(size_of_signal(signals[key]) for key in keys if key in signals)
     force = size_of_signal(signals[f"spring@{name}"]) or drive
     time = _over(x, size_about_zero(signals[f"rate@{name}"]))
-    travel = _travel(signals[f"motion@{name}"])
+    travel = _travel(signals[f"motion@{name}"], is_shown)
     return _not_zero({"x": x, "travel": travel, "force": force, "drive": drive, "time": time})
 
 
-def _travel(signals: Sequence[Floats]) -> float:
-    """Return the largest range of a signal within one record."""
-    return max(float(np.ptp(signal)) for signal in signals)
+def _travel(positions: Sequence[Floats], is_shown: bool) -> float:
+    """Return the range of all positions; of those of one record where no sensor says how far records begin from each other."""
+    return max(float(np.ptp(own)) for own in ([np.concatenate(positions)] if is_shown else positions))
 
 
 def _own_sizes(equations: RigEquations, z: Floats, u: Floats, p: Floats, accelerations: Floats) -> Floats:
@@ -208,11 +220,12 @@ def characteristic_scales(
 ) -> dict[str, float]:
     """Return the size of each base quantity of `rigsight.units` in these records, for constants and parameters by name.
 
-    ``x`` displacement, ``travel`` (its largest range within one record), ``input``, ``drive`` (force of the drive), ``force`` (of
-    the spring), ``time`` [s] (reciprocal of the angular frequency of the motion) and ``length`` (size of the rig's own first
-    state, 1 if there is none), each without a place and at every joint, drive, sensor and state (``force@shaft``); for a rig with
-    more than one motion also ``size@NAME`` for each of its parameters, coordinates, rates (``size@d(NAME)``) and states, and
-    ``matters@NAME`` for each parameter: the size at which it matters as much as the largest part of an equation.
+    ``x`` displacement, ``travel`` (its range, within one record where no sensor shows it), ``input``, ``drive`` (force of the
+    drive), ``force`` (of the spring), ``time`` [s] (reciprocal of the angular frequency of the motion) and ``length`` (size of
+    the rig's own first state, 1 if there is none), each without a place and at every joint, drive, sensor and state
+    (``force@shaft``); for a rig with more than one motion also ``size@NAME`` for each of its parameters, coordinates, rates
+    (``size@d(NAME)``) and states, and ``matters@NAME`` for each parameter: the size at which it matters as much as the largest
+    part of an equation.
     """
     if not rig.has_one_motion:
         return scales_at_places(rig, records, values)
@@ -222,11 +235,9 @@ def characteristic_scales(
     scales = {**plain, **{f"{base}@{place}": size for place in places for base, size in plain.items()}}
     seen = {output.name: [r[output.name] for r in records if output.name in r] for output in rig.outputs}
     for name in [*seen, *(state.name for state in mechanism.states if state.name not in seen)]:
-        own = (
-            {"x": typical_size(seen[name]), "travel": _travel(seen[name]) or _UNKNOWN}
-            if seen.get(name)
-            else {}
-        )
+        own = dict[str, float]()
+        if readings := seen.get(name):
+            own = {"x": typical_size(readings), "travel": _travel(readings, is_shown=True) or _UNKNOWN}
         scales |= {f"{base}@{name}": size for base, size in {**plain, **own}.items()}
     return scales
 
@@ -248,7 +259,7 @@ def _of_one_motion(rig: Rig, records: Sequence[Record], values: Mapping[str, flo
         length = typical_size(seconds) if seconds else 1.0
     return {
         "x": displacement,
-        "travel": _travel(moved) or _UNKNOWN,
+        "travel": _travel(moved, is_shown=True) or _UNKNOWN,
         "input": drive_input,
         # Without a drive, the spring force is the characteristic size of every force.
         "drive": abs(gain) * drive_input if is_driven else float(spring),
@@ -265,7 +276,7 @@ def _prescribed(rig: Rig, records: Sequence[Record]) -> dict[str, float]:
     force = typical_size([r[rig.outputs[0].name] for r in records])
     return {
         "x": displacement,
-        "travel": _travel([x for x, _ in motions]) or _UNKNOWN,
+        "travel": _travel([x for x, _ in motions], is_shown=True) or _UNKNOWN,
         "force": force,
         "drive": force,
         "time": displacement / velocity,
