@@ -163,6 +163,13 @@ def test_a_slow_decay_is_seen_wherever_the_record_is_cut(phase: float) -> None:
     assert "warning" not in severities(check(replace(campaign(), records=(record,))), "x")
 
 
+def test_noise_around_zero_at_the_end_of_a_decay_is_no_motion_that_lasts() -> None:
+    t = 0.1 * np.arange(1000)
+    x = 0.285 * np.exp(-0.02 * t) * np.cos(0.45 * t) + 0.002 * np.random.default_rng(0).standard_normal(t.size)
+    record = Record("blow", 0.1, {"u": np.zeros(t.size), "x": x}, {})
+    assert "warning" not in severities(check(replace(campaign(), records=(record,))), "x")
+
+
 def test_an_unstable_rig_is_a_warning_and_its_parameters_are_known_all_the_same() -> None:
     own = campaign()
     unstable = replace(own, parameters={**own.parameters, "k": -30.0, "d": 5.0})

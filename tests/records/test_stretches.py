@@ -10,6 +10,7 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.records import ReadingOptions, read_record
+from rigsight.records.conditioning import pauses
 from rigsight.records.read_record import read_stretches
 from rigsight.workflow.campaign.read_campaign import read_campaign
 
@@ -150,3 +151,12 @@ def test_a_campaign_holds_the_stretches(tmp_path: Path) -> None:
     assert [r.n_samples for r in campaign.records] == [200] * 4
     assert len({r.name for r in campaign.records}) == 4
     assert [r.role for r in campaign.records] == ["estimation"] * 2 + ["validation"] * 2
+
+
+def test_events_of_a_shaft_that_slows_down_have_no_gap() -> None:
+    turn = np.arange(163)
+    # Of a coast-down by dry friction: 2 pi turn = w t - a t^2 / 2.
+    speed, slowing = 40.0, 0.78
+    t = (speed - np.sqrt(speed**2 - 4.0 * np.pi * slowing * turn)) / slowing
+    assert np.diff(t).max() > 6.0 * np.median(np.diff(t))
+    assert pauses(t).size == 0

@@ -179,14 +179,14 @@ def _lasting(campaign: Campaign) -> Iterator[Remark]:
         if not all(is_constant(record[s.name]) for s in campaign.rig.inputs if s.name in record):
             continue
         for sensor in (s.name for s in campaign.rig.outputs if s.name in record):
-            swings = _amplitudes(record[sensor][record.n_samples // 3 :])
+            rest = _RESTS * float(np.ptp(record[sensor])) / 2.0
+            swings = _amplitudes(record[sensor][record.n_samples // 3 :], rest)
             if len(swings) < _FEWEST_SWINGS:
                 continue
             # The same number of swings to both sides.
             half = len(swings) // 4 * 2
             before, last = float(np.mean(swings[-2 * half : -half])), float(np.mean(swings[-half:]))
-            still_moves = last > max(_LASTS * before, _RESTS * float(np.ptp(record[sensor])) / 2.0)
-            if still_moves and moves_beyond_noise(record[sensor]):
+            if last > _LASTS * before and moves_beyond_noise(record[sensor]):
                 yield Remark(
                     "warning",
                     f"Record {record.name}: {sensor} does not decay while nothing drives the rig (mean amplitude of its last "
@@ -198,10 +198,11 @@ def _lasting(campaign: Campaign) -> Iterator[Remark]:
                 )
 
 
-def _amplitudes(samples: Floats) -> list[float]:
-    """Return the largest deviation from the mean between its crossings, of whole half periods."""
+def _amplitudes(samples: Floats, rest: float) -> list[float]:
+    """Return the largest deviation from the mean of whole half periods; noise that crosses the mean within `rest` ends none."""
     deviation = samples - np.mean(samples)
-    crossings = np.flatnonzero(np.diff(deviation >= 0.0)) + 1
+    moving = np.flatnonzero(np.abs(deviation) > rest)
+    crossings = moving[np.flatnonzero(np.diff(deviation[moving] >= 0.0)) + 1]
     return [float(np.max(np.abs(part))) for part in np.split(deviation, crossings)[1:-1]]
 
 

@@ -117,7 +117,8 @@ def time_base(stamps: Floats, lines: NDArray[np.int64], file: str, row: str = "l
             f"{file}, {row} {lines[worst + 1]}: the samples are not equally spaced; the step to "
             f"t = {stamp_text(stamps, worst + 1)} is {steps[worst]:.4g}, the mean step {dt:.4g} "
             f"(jitter {100 * jitter:.2g} %, at most {100 * LARGEST_JITTER:g} % is resampled). "
-            "Record with a fixed sample time, or cut the record to its even part with start and end."
+            "Record with a fixed sample time, or cut the record to its even part with start and end. Of events, such as one a "
+            "turn of a shaft, interpolate the reading on even times before."
         )
     agrees = bool(np.all(deviation <= LARGEST_ROUNDING * rounding))
     if agrees and COARSEST_STAMPS < rounding.max() / slope <= COARSE_BUT_CLEAR:
@@ -151,12 +152,18 @@ def pauses(stamps: Floats) -> NDArray[np.intp]:
     longest = 1.0 + LARGEST_JITTER + _WHOLE
     off_whole = np.abs(in_samples[found] - np.round(in_samples[found]))
     found = found[(off_whole <= max(_WHOLE, 2.0 * varies)) | (in_samples[found] > longest)]
-    found = found[[_is_missed(stamps, int(sample)) for sample in found]] if found.size else found
+    found = found[[_is_longer_than_its_neighbors(steps, int(i)) and _is_missed(stamps, int(i)) for i in found]] if found.size else found
     if found.size == 0 or found.size > MOST_PAUSES * steps.size:
         return none
     lengths = np.diff([0, *(found + 1), stamps.size])
     too_little = lengths[lengths >= FEWEST_SAMPLES].sum() < FEWEST_KEPT * stamps.size
     return none if too_little and bool(np.all(in_samples <= longest)) else found
+
+
+def _is_longer_than_its_neighbors(steps: Floats, sample: int) -> bool:
+    """Return False if the steps around a long one have grown to it, as those of one event a turn of a shaft that slows down."""
+    near = np.r_[steps[max(0, sample - 2) : sample], steps[sample + 1 : sample + 3]]
+    return bool(steps[sample] > LEAST_PAUSE * np.median(near))
 
 
 def _is_missed(stamps: Floats, sample: int) -> bool:
