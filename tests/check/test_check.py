@@ -165,7 +165,9 @@ def test_a_slow_decay_is_seen_wherever_the_record_is_cut(phase: float) -> None:
 
 def test_noise_around_zero_at_the_end_of_a_decay_is_no_motion_that_lasts() -> None:
     t = 0.1 * np.arange(1000)
-    x = 0.285 * np.exp(-0.02 * t) * np.cos(0.45 * t) + 0.002 * np.random.default_rng(0).standard_normal(t.size)
+    x = 0.285 * np.exp(-0.02 * t) * np.cos(0.45 * t) + 0.002 * np.random.default_rng(0).standard_normal(
+        t.size
+    )
     record = Record("blow", 0.1, {"u": np.zeros(t.size), "x": x}, {})
     assert "warning" not in severities(check(replace(campaign(), records=(record,))), "x")
 

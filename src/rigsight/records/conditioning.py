@@ -152,7 +152,8 @@ def pauses(stamps: Floats) -> NDArray[np.intp]:
     longest = 1.0 + LARGEST_JITTER + _WHOLE
     off_whole = np.abs(in_samples[found] - np.round(in_samples[found]))
     found = found[(off_whole <= max(_WHOLE, 2.0 * varies)) | (in_samples[found] > longest)]
-    found = found[[_is_longer_than_its_neighbors(steps, int(i)) and _is_missed(stamps, int(i)) for i in found]] if found.size else found
+    missed = [_stands_out(steps, int(i)) and _is_missed(stamps, int(i)) for i in found]
+    found = found[np.array(missed, dtype=bool)]
     if found.size == 0 or found.size > MOST_PAUSES * steps.size:
         return none
     lengths = np.diff([0, *(found + 1), stamps.size])
@@ -160,7 +161,7 @@ def pauses(stamps: Floats) -> NDArray[np.intp]:
     return none if too_little and bool(np.all(in_samples <= longest)) else found
 
 
-def _is_longer_than_its_neighbors(steps: Floats, sample: int) -> bool:
+def _stands_out(steps: Floats, sample: int) -> bool:
     """Return False if the steps around a long one have grown to it, as those of one event a turn of a shaft that slows down."""
     near = np.r_[steps[max(0, sample - 2) : sample], steps[sample + 1 : sample + 3]]
     return bool(steps[sample] > LEAST_PAUSE * np.median(near))
