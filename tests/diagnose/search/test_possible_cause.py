@@ -15,14 +15,22 @@ from rigsight.diagnose.search.possible_cause import (
     is_undetermined,
     leading,
 )
+from rigsight.records import Record
+from rigsight.rigs import AXIS
 
 from ..conftest import with_numbers
+
+
+def record() -> Record:
+    """Return 20 s of a motion that something drives."""
+    t = 0.01 * np.arange(2001)
+    return Record("driven", 0.01, {"u": np.sin(t), "x": np.sin(t)}, {})
 
 
 def context() -> Any:
     """What is asked of the records: their duration, and the size and range of their motion."""
     scales = {"x": 1.0, "travel": 2.0, "time": 1.0}
-    return SimpleNamespace(records=(SimpleNamespace(duration=20.0),), scales=scales)
+    return SimpleNamespace(rig=AXIS, records=(record(),), scales=scales)
 
 
 def test_an_effect_none_of_whose_numbers_the_records_determine_is_undetermined(friction_models) -> None:
@@ -70,6 +78,26 @@ def test_what_is_slower_or_longer_than_the_records_is_no_candidate(
 ) -> None:
     model = with_numbers(scored((effect,)), values, dict.fromkeys(values, 0.1))
     assert is_beyond_records(model, context()) is beyond
+
+
+@pytest.mark.parametrize(
+    ("damping", "pulsation", "drive", "is_motion"),
+    [
+        (0.1, 5.1, 0.0, True),
+        (0.1, 6.0, 0.0, False),
+        # What lasts is driven, by the tone or by the input.
+        (0.0, 5.0, 0.0, False),
+        (0.1, 5.1, 1.0, False),
+    ],
+)
+def test_a_tone_at_the_frequency_of_a_free_motion_that_decays_is_this_motion(
+    scored, damping: float, pulsation: float, drive: float, is_motion: bool
+) -> None:
+    t = 0.01 * np.arange(2000)
+    signals = {"u": drive * np.sin(3.0 * t), "x": np.exp(-damping * t) * np.cos(5.0 * t)}
+    asked = SimpleNamespace(rig=AXIS, records=(Record("decay", 0.01, signals, {}),), scales={})
+    tone = with_numbers(scored(("periodic_disturbance",)), {"T_p": 1.0, "w_p": pulsation}, {})
+    assert is_beyond_records(tone, asked) is is_motion
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,10 @@ from rigsight.inverse import Proposal, ProposedCause, ProposedStart
 from rigsight.rigs import AXIS
 
 
-def cause(name: str, share: float) -> ProposedCause:
+def cause(name: str, share: float, least: float | None = None) -> ProposedCause:
     effect = effect_named(name)
-    return ProposedCause(effect, effect.family, AXIS.where(effect), share, {})
+    interval = (share if least is None else least, 1.0)
+    return ProposedCause(effect, effect.family, AXIS.where(effect), share, {}, interval)
 
 
 def fitted(*alone: ProposedCause, taken: tuple[ProposedCause, ...] = (), by_chance: float = 0.1) -> set[str]:
@@ -40,6 +41,7 @@ def test_a_further_family_that_was_taken_is_fitted() -> None:
 def test_where_no_family_explains_enough_all_are_fitted() -> None:
     assert len(fitted(cause("coulomb_friction", 0.2))) == len(CATALOGUE)
     assert len(fitted(cause("coulomb_friction", 0.8), by_chance=0.9)) == len(CATALOGUE)
+    assert len(fitted(cause("coulomb_friction", 0.8, least=0.02))) == len(CATALOGUE)
     assert worth_fitting(AXIS, None, CATALOGUE).alone == CATALOGUE
 
 

@@ -17,7 +17,12 @@ from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.nested_models import is_lower
 from rigsight.effects import Effect, placed_dimension
+from rigsight.frequency.persistent_line import line_power
+from rigsight.identify.fit.windows import leading_output
 from rigsight.parameters import Parameter
+from rigsight.records import Record
+from rigsight.records.signals import is_constant
+from rigsight.rigs import Rig
 from rigsight.units import characteristic_value
 
 
@@ -89,8 +94,10 @@ def is_beyond_records(model: FittedModel, context: FitContext) -> bool:
         if parameter.dimension == "time":
             return value > duration
         if parameter.dimension == "time^-1":
-            least = VERDICT.least_periods if parameter.name == str(effect.pulsation) else 1.0
-            return value * duration < 2.0 * math.pi * least
+            is_tone = parameter.name == str(effect.pulsation)
+            least = VERDICT.least_periods if is_tone else 1.0
+            of_rig = is_tone and all(_swings_freely_at(value, context.rig, own) for own in context.records)
+            return of_rig or value * duration < 2.0 * math.pi * least
         if parameter.name == effect.wave_number:
             return value * characteristic_value(placed_dimension(effect, "travel"), scales) < 2.0 * math.pi
         size = characteristic_value(placed_dimension(effect, parameter.dimension), scales)
@@ -103,6 +110,19 @@ def is_beyond_records(model: FittedModel, context: FitContext) -> bool:
         if (parameter.null is None or is_delay(effect, parameter))
         and fit.structure.parameter_name(effect, parameter.name) in fit.free
     )
+
+
+def _swings_freely_at(pulsation: float, rig: Rig, record: Record) -> bool:
+    """Return True if a motion that nothing drives decays at a frequency that is not resolved from this one (half power)."""
+    output = leading_output(rig, [record])
+    if any(not is_constant(record[s.name]) for s in rig.inputs if s.name in record) or output not in record:
+        return False
+    motion, half = record[output] - np.mean(record[output]), record.n_samples // 2
+    spectrum = np.abs(np.fft.rfft(motion, 4 * motion.size)) ** 2
+    own = 2.0 * math.pi * np.argmax(spectrum) / (4 * motion.size * record.dt)
+    decays = np.sum(motion[half:] ** 2) < (1.0 - VERDICT.larger_part) * np.sum(motion[:half] ** 2)
+    power = [line_power(motion, record.dt, w) for w in (pulsation, own)]
+    return bool(decays and power[0] > VERDICT.larger_part * power[1])
 
 
 def _is_within_errors(model: FittedModel, effect: Effect) -> bool:

@@ -130,8 +130,8 @@ def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]
     if proposal is None or not proposal.alone:
         return WorthFitting(tuple(effects))
     everything = WorthFitting(tuple(effects), starts=proposal.starts)
-    most = proposal.alone[0].share
-    if most < max(SEARCH.decisive_force, proposal.by_chance):
+    most, (least, _) = proposal.alone[0].share, proposal.alone[0].interval
+    if least < SEARCH.decisive_force or most < proposal.by_chance:
         return everything
     near = {(c.family, c.where) for c in proposal.alone if c.share >= SEARCH.near_force * most}
     near |= {(cause.family, cause.where) for cause in proposal.taken}
