@@ -213,8 +213,8 @@ class SearchNumbers:
     basin_finish_evaluations: int = budget(60, "Evaluations of the fit in a lower minimum.")
     decisive_force: float = assumption(
         0.25,
-        "Share of the squared missing force along the measured motion that a family must explain alone, by the lower limit of its "
-        "interval, for others to be left out of the fits.",
+        "Share of the squared missing force along the measured motion that a family must explain alone, by the lower limit of "
+        "its interval, for others to be left out of the fits.",
         "thirteen measured rigs: with 0.5 two rigs with friction (0.26, 0.37) were searched for all families",
     )
     near_force: float = assumption(
