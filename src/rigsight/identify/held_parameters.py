@@ -137,8 +137,20 @@ def weighed_spring(
     """Return whether the records of an axis show an absent spring, and a note; None if they cannot be fitted.
 
     A stiffness of zero that is given states that there is no spring. It is fitted to windows of the records, beside the same fit
-    with zero: if it differs from zero beyond its error and lowers the error, the records contradict the statement.
+    with zero: if it differs from zero beyond its error and lowers the error, the records contradict the statement. A shaft that
+    turns by more than a turn has none: what seems to be one is another force.
     """
+    turns = [
+        float(np.ptp(r[s.name])) / math.tau
+        for r in records
+        for s in rig.outputs
+        if s.name in r and s.unit == "rad"
+    ]
+    if max(turns, default=0.0) > 1.0:
+        return (
+            False,
+            f"{stiffness} = 0 is held in all fits: a shaft that turns by {max(turns):.3g} turns has no spring.",
+        )
     known = {**held, **{symbol.name: 0.0 for symbol in rig.motion.rest.free_symbols}}
     try:
         start = {**constants, **linear_start(rig, records, constants, known)}

@@ -124,6 +124,19 @@ def test_a_spring_that_is_given_as_absent_is_weighed(tmp_path: Path, k: float, r
         assert differs(found, {"k": k})["k"] < 4.0
 
 
+@pytest.mark.parametrize(("size", "released"), [(1.0, True), (5000.0, False)])
+def test_a_shaft_that_turns_by_more_than_a_turn_has_no_spring(
+    tmp_path: Path, size: float, released: bool
+) -> None:
+    loop = in_a_loop(2.0, 5.0, -8.0, 0)
+    turned = {"t": loop["t"], "u": size * loop["u"], "x_rad": size * loop["x"]}
+    assert (np.ptp(turned["x_rad"]) > 2.0 * np.pi) is not released
+    folder = campaign_of(tmp_path, dict.fromkeys("ab", turned), "m = 2.0\nk = 0.0")
+    file = folder / "campaign.toml"
+    file.write_text(file.read_text().replace('hold = "zoh"', 'hold = "zoh"\ncolumns.x = "x_rad"'))
+    assert with_weighed_spring(read_campaign(folder)).spring_released is released
+
+
 def test_an_absent_spring_is_weighed_without_effects_that_are_still_to_be_fitted(tmp_path: Path) -> None:
     records = {name: in_a_loop(2.0, 5.0, 0.0, seed=seed) for seed, name in enumerate("ab")}
     folder = campaign_of(tmp_path, records, "m = 2.0\nk = 0.0")
