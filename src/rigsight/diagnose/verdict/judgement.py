@@ -236,7 +236,7 @@ def with_unseen(
             m.error_over_noise <= reidentified.error_over_noise and m.names not in ranking.impossible
             for m in forms
         )
-        is_shown = cause.effect.torque is not None and cause.share >= max(
+        is_shown = cause.effect.torque is not None and cause.interval[0] >= max(
             VERDICT.larger_part, proposal.by_chance
         )
         if is_seen or not starts or not is_shown:
