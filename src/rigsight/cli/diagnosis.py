@@ -162,16 +162,23 @@ def power(
     output.show(file, lambda: _sizes_table(found), {"Sizes": file})
 
 
-def _sizes_table(found: Power) -> Table:
-    from rigsight.report.labels import effect_label
+def _sizes_table(found: Power) -> Group:
+    from rich.console import Group
+
+    from rigsight.report.labels import effect_label, listed
     from rigsight.units import behind
 
-    rows = []
+    rows, without = [], dict[str, list[str]]()
     for size in found.sizes:
         values = [f"{name} = {value:.3g}{behind(unit)}" for name, (value, unit) in size.parameters.items()]
-        words = values[0] + (f" (with {', '.join(values[1:])})" if values[1:] else "") if values else ""
-        rows.append((effect_label(size.effect), size.where, words or size.reason))
-    return table(("Effect", "Where", "Named from"), rows)
+        if values:
+            beside = f" (with {', '.join(values[1:])})" if values[1:] else ""
+            rows.append((effect_label(size.effect), size.where, values[0] + beside))
+        else:
+            without.setdefault(size.reason, []).append(f"{effect_label(size.effect)} at {size.where}")
+    reasons = [(listed(effects), reason) for reason, effects in without.items()]
+    named = [table(("Effect", "Where", "Named from"), rows)] if rows else []
+    return Group(*named, *([table(("Effects without a size", "Why"), reasons)] if reasons else []))
 
 
 @with_groups
