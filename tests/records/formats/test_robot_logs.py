@@ -283,3 +283,17 @@ def test_a_sqlite_file_that_is_no_bag_is_one_message(tmp_path: Path) -> None:
         open_channels(tmp_path / "other.db3"),
     ):
         pass
+
+
+def test_a_node_that_was_started_again_goes_on_with_its_channels(tmp_path: Path) -> None:
+    rosbag1, typesys = pytest.importorskip("rosbags.rosbag1"), pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS1_NOETIC)
+    kind = "std_msgs/msg/Float64"
+    with rosbag1.Writer(tmp_path / "again.bag") as file:
+        runs = [file.add_connection("/angle", kind, typestore=store, callerid=node) for node in ("/a", "/b")]
+        for i in range(40):
+            message = store.types[kind](data=float(i))
+            file.write(runs[i // 20], START + i * 10_000_000, store.serialize_ros1(message, kind))
+    with open_channels(tmp_path / "again.bag") as file:
+        (angle,) = file.channels
+        np.testing.assert_array_equal(angle.load(), np.arange(40.0))

@@ -95,7 +95,8 @@ class _Clock:
             if ahead < -_LONGEST:
                 where += " (longer than messages travel)"
         if not self.is_even:
-            return f"{where} and run at {own / span:.3g} of their speed, as simulated time does"
+            speed = f"{own / span:.3g} of their speed on average"
+            return f"{where} and run at {speed}, as simulated time or a clock that is set"
         drift = own - span
         if abs(drift) < _SYNCHRONIZED:
             return where
@@ -145,11 +146,12 @@ def _onto(base: _Clock, own: _Clock | None, topic: Stamps, others_have_headers: 
         if not own.is_even:
             notes.append(f"the headers of '{topic.topic}' {own.describe()}; the record goes by them")
         return OnOneClock(stamped, late / _SECOND, tuple(notes))
-    differing = own if base.is_of_recorder else base
-    onto = "the recorder" if base.is_of_recorder else f"'{base.topic}'"
-    whose = f"the headers of '{topic.topic}' are by another clock than that of {onto}"
+    if base.is_of_recorder:
+        whose, how = "that of the recorder", f"they {own.describe()}"
+    else:
+        whose, how = f"those of '{base.topic}'", f"the latter {base.describe()}"
     moved = "they were moved onto it, so that fast messages take no time"
-    notes.append(f"{whose}: those of '{differing.topic}' {differing.describe()}; {moved}")
+    notes.append(f"the headers of '{topic.topic}' are by another clock than {whose}: {how}; {moved}")
     return OnOneClock(base.shows(own.moment(stamped)), late / _SECOND, tuple(notes))
 
 

@@ -50,17 +50,25 @@ class _Topic:
     """The messages of one topic and type."""
 
     reader: Any
-    connection: Any
+    # In ROS 1 there is one for each publisher, and another one when that is started again.
+    connections: list[Any]
 
     @property
     def name(self) -> str:
-        return str(self.connection.topic).strip("/")
+        return str(self.connections[0].topic).strip("/")
+
+    @property
+    def kind(self) -> str:
+        return str(self.connections[0].msgtype)
+
+    @property
+    def n_messages(self) -> int:
+        return sum(connection.msgcount for connection in self.connections)
 
     def messages(self) -> Iterator[tuple[int, int, dict[str, float]]]:
         """Yield times of reception and of the message itself [ns], and the numbers of each message."""
-        connection = self.connection
-        for _, received, raw in self.reader.messages([connection]):
-            message = self.reader.deserialize(raw, connection.msgtype)
+        for _, received, raw in self.reader.messages(self.connections):
+            message = self.reader.deserialize(raw, self.kind)
             yield received, _stamp(message), dict(_flat(message, "", ()))
 
 
@@ -87,15 +95,18 @@ def open_bag(path: Path) -> Iterator[ChannelFile]:
         raise InputError(f"{path.name} is a bag whose name does not end in {suffix}; rename it.")
     # Bags of ROS 2 before Iron have no definitions: the messages of ROS itself are known.
     with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
-        yield listed(path.name, _parts(path.name, [_Topic(reader, own) for own in reader.connections]))
+        topics: dict[tuple[str, str], _Topic] = {}
+        for own in reader.connections:
+            topics.setdefault((own.topic, own.msgtype), _Topic(reader, [])).connections.append(own)
+        yield listed(path.name, _parts(path.name, list(topics.values())))
 
 
 def _parts(file: str, topics: Sequence[_Topic]) -> Iterator[Channel | Refused]:
     read: list[tuple[str, _Numbers]] = []
     n_samples = 0
     for topic in topics:
-        kind = topic.connection.msgtype
-        if reason := too_short(topic.connection.msgcount):
+        kind = topic.kind
+        if reason := too_short(topic.n_messages):
             yield Refused(topic.name, reason)
             continue
         numbers = _Numbers()
