@@ -151,3 +151,14 @@ def test_unusable_time_is_told_with_line_and_mend(case: str, reported: list[str]
         base_of(broken(case))
     for fragment in ["log.csv", *reported]:
         assert fragment in str(caught.value)
+
+
+def test_one_jump_of_the_clock_is_told_from_jitter() -> None:
+    even = 0.01 * np.arange(400)
+    jumping = time_base(even + 0.012 * (even > 2.0), np.arange(400), "run.csv")
+    wandering = time_base(
+        even + 0.005 * np.random.default_rng(0).uniform(size=400), np.arange(400), "run.csv"
+    )
+    assert jumping.n_far == 1
+    assert jumping.jitter > 0.5
+    assert wandering.n_far > 40

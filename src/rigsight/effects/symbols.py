@@ -113,14 +113,44 @@ def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
     ``sign(x/a)``, because a could be 0, or ``Abs(x**n)``. Such results cannot be evaluated.
     """
     if not expression.has(sp.sign, sp.Abs, positive_part):
-        return sp.diff(expression, symbol)
+        return _slope(expression, symbol, {})
     real = expression.replace(sp.sign, _RealSign).replace(sp.Abs, _RealAbs)
     return (
-        sp.diff(real, symbol)
+        _slope(real, symbol, {})
         .replace(sp.sign, _RealSign)
         .replace(_RealSign, sp.sign)
         .replace(_RealAbs, sp.Abs)
     )
+
+
+def _slope(expression: sp.Expr, symbol: sp.Symbol, known: dict[sp.Expr, sp.Expr]) -> sp.Expr:
+    """Return the derivative of an expression, with those that are `known` of its parts.
+
+    `sympy.diff` differentiates a part anew wherever it occurs; of an arm, whose joints carry one another, that is many times.
+    """
+    if expression in known:
+        return known[expression]
+    parts, rule = expression.args, getattr(type(expression), "_eval_derivative", None)
+    if not parts:
+        found = sp.S.One if expression == symbol else sp.S.Zero
+    elif isinstance(expression, sp.Add):
+        found = sp.Add(*(_slope(part, symbol, known) for part in parts))
+    elif isinstance(expression, sp.Mul):
+        slopes = [_slope(part, symbol, known) for part in parts]
+        found = sp.Add(
+            *(sp.Mul(*parts[:i], own, *parts[i + 1 :]) for i, own in enumerate(slopes) if own != 0)
+        )
+    elif isinstance(expression, sp.Pow) and expression.exp.is_number:
+        base, power = parts
+        own = _slope(base, symbol, known)
+        found = expression * (own * power / base) if own != 0 else sp.S.Zero
+    elif rule is sp.Function._eval_derivative:
+        slopes = [_slope(part, symbol, known) for part in parts]
+        found = sp.Add(*(own * expression.fdiff(i) for i, own in enumerate(slopes, 1) if own != 0))
+    else:
+        found = sp.diff(expression, symbol)
+    known[expression] = found
+    return found
 
 
 def rate_along(expression: sp.Expr, rates: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:

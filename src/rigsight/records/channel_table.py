@@ -253,9 +253,10 @@ class _Selection:
         return as_floats(samples)
 
     def notes(self) -> tuple[str, ...]:
-        """Return what the file says of stored numbers."""
+        """Return what the file says of stored numbers and of the stamps beside them."""
         channels = [self._file.channels[number] for number in self.found.values()]
-        return tuple(
+        of_stamps = (note for one in channels if one.axis is not None for note in one.axis.notes)
+        return *dict.fromkeys(of_stamps), *(
             f"{self._path.name}, channel '{channel.name}': {note}."
             for channel in channels
             for note in (
@@ -370,7 +371,9 @@ class _Selection:
             assert channel.axis is not None
             if channel.axis not in self._axes:
                 stamps = in_seconds(self._path, channel, channel.axis)
-                self._axes[channel.axis] = Clock(_OWN_AXIS, stamps, "s", channel.axis.origin)
+                self._axes[channel.axis] = Clock(
+                    _OWN_AXIS, stamps, "s", channel.axis.origin, channel.axis.late
+                )
             return self._axes[channel.axis]
         chosen = next((clock for clock in tried if increases(clock.stamps)), tried[-1])
         if channel is not None and self._file.lines is None and chosen.stamps.size != channel.n_samples:

@@ -149,6 +149,7 @@ class Clock:
     stamps: Floats  # time stamps, shape (n_samples,)
     unit: str | None = None  # stated by the file; None where it is that of the campaign
     origin: np.datetime64 | None = None  # moment from which they count; None where the file does not say
+    late: float = 0.0  # see `TimeAxis`
 
 
 def refuse_one_dt(file: str, dt: float, what: str) -> NoReturn:
@@ -162,6 +163,9 @@ def refuse_one_dt(file: str, dt: float, what: str) -> NoReturn:
 def with_clocks(file: str, table: Columns, clocks: Mapping[str, Clock]) -> Columns:
     """Return a table with the time of its signals: one for all where they share it, else the stamps of each."""
     chosen = list(clocks.values())
+    # What stamps say of two signals and what their reception says differ by this.
+    late = [clock.late for clock in chosen]
+    table = replace(table, clock_uncertainty=max(late) - min(late))
     shared = shared_clock(chosen)
     known = {signal: clock.origin for signal, clock in clocks.items() if clock.origin is not None}
     if shared is not None:

@@ -129,6 +129,8 @@ class Columns:
     names: tuple[str, ...] = ()  # names of all columns in the file
     # Signal name -> moment from which its time counts, where the file says so.
     origins: Mapping[str, np.datetime64] = field(default_factory=dict)
+    # Time [s] by which signals may be late against each other, as far as the file can tell.
+    clock_uncertainty: float = 0.0
 
     @property
     def stamps(self) -> Mapping[str, Floats]:

@@ -57,6 +57,7 @@ class TimeBase:
     stamps: Floats | None = None
     # Of these stamps, as a share of `dt`: how far they, or the steps between them, are from even at most.
     jitter: float = 0.0
+    n_far: int = 0  # how many steps are from even by more than half of that
     notes: tuple[str, ...] = ()  # what was assumed
 
     @property
@@ -128,7 +129,10 @@ def time_base(stamps: Floats, lines: NDArray[np.int64], file: str, row: str = "l
         )
         even = _plain(slope, float(rounding[-1]) / stamps.size)
         return TimeBase(float(stamps[0] + start), even, stamps.size, notes=(note,))
-    return TimeBase(float(stamps[0]), _plain(dt, jitter * dt / stamps.size), stamps.size, stamps, jitter)
+    even = _plain(dt, jitter * dt / stamps.size)
+    # From the median, as one jump moves the mean of all others.
+    n_far = int(np.count_nonzero(np.abs(steps - np.median(steps)) > 0.5 * jitter * dt))
+    return TimeBase(float(stamps[0]), even, stamps.size, stamps, jitter, n_far)
 
 
 def stamp_text(stamps: Floats, sample: int) -> str:

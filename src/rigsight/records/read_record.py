@@ -209,7 +209,7 @@ def read_stretches(
                 kind=kind,
                 amplitude=options.amplitude,
                 hold="band_limited" if on_axis.is_filtered else options.hold,
-                clock_uncertainty=on_axis.clock_uncertainty,
+                clock_uncertainty=max(on_axis.clock_uncertainty, table.clock_uncertainty),
                 source=path,
                 notes=(*before, *slow, *on_axis.notes, *found) if number == 1 else (*slow, *on_axis.notes),
                 constants=options.constants or {},

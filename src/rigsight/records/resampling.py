@@ -80,7 +80,7 @@ def joined(
         how.append(f"{signal} {manner}" + ("" if same_rate else f", from {base.dt:.6g} s"))
         costs.append(f"{signal} {100.0 * cost:.2g} %")
     notes = [note for base in distinct for note in base.notes]
-    jitter = max(base.jitter for base in distinct)
+    jitter = max(distinct, key=lambda base: base.jitter)
     apart = len(distinct) > 1 and _differ(distinct)
     if how or apart:
         notes.append(_note(file, bases, clocks if apart else {}, dt, how, costs, jitter, step, is_filtered))
@@ -217,7 +217,7 @@ def _note(
     dt: float,
     how: Sequence[str],
     costs: Sequence[str],
-    jitter: float,
+    jitter: TimeBase,
     step: float | None,
     is_filtered: bool,
 ) -> str:
@@ -228,8 +228,10 @@ def _note(
             for signal, base in bases.items()
         )
         why.append(f"the signals have clocks of their own ({listed})")
-    if jitter > 0.0:
-        why.append(f"time stamps jitter by up to {float(f'{100.0 * jitter:.2g}'):g} % of the sample time")
+    if jitter.jitter > 0.0:
+        steps = f"{jitter.n_far} of {jitter.n_samples - 1} steps by more than half of that"
+        share = float(f"{100.0 * jitter.jitter:.2g}")
+        why.append(f"time stamps jitter by up to {share:g} % of the sample time ({steps})")
     if step is not None:
         why.append(f"resample = {step:g} is asked for")
     cost = f" Error at most about {', '.join(costs)} of the RMS, noise included." if costs else ""

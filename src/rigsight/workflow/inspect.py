@@ -106,7 +106,10 @@ def run_inspect(path: str | Path, own_rigs: Iterable[Rig] = ()) -> Inspection:
         proposal.guess.rig.name,
         proposal.toml("estimation", '"validation" for records that are only scored'),
         proposal.n_blanks,
-        file.notes,
+        (
+            *file.notes,
+            *dict.fromkeys(note for c in file.channels if c.axis is not None for note in c.axis.notes),
+        ),
     )
 
 

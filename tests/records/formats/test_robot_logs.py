@@ -75,7 +75,7 @@ def test_a_channel_has_samples_only_where_messages_hold_it(tmp_path: Path, first
         np.testing.assert_allclose(grip.axis.stamps(), 0.001 + 0.01 * np.arange(first, 100))
 
 
-def test_a_simulated_clock_gives_way_to_the_reception(tmp_path: Path) -> None:
+def test_a_simulated_clock_is_the_time(tmp_path: Path) -> None:
     def messages(built: Any) -> Any:
         for i in range(10):
             simulated = joint_state(built, 5_000_000_000 + i * 1_000_000, ["arm"], [float(i)])
@@ -84,7 +84,7 @@ def test_a_simulated_clock_gives_way_to_the_reception(tmp_path: Path) -> None:
     with open_channels(bag(tmp_path / "simulated", messages)) as file:
         (arm,) = file.channels
         assert arm.axis is not None
-        np.testing.assert_allclose(arm.axis.stamps(), 0.002 * np.arange(10))
+        np.testing.assert_allclose(arm.axis.stamps(), 0.001 * np.arange(10))
 
 
 def test_images_beside_the_joints_are_passed_over(tmp_path: Path) -> None:
@@ -283,3 +283,17 @@ def test_a_sqlite_file_that_is_no_bag_is_one_message(tmp_path: Path) -> None:
         open_channels(tmp_path / "other.db3"),
     ):
         pass
+
+
+def test_a_node_that_was_started_again_goes_on_with_its_channels(tmp_path: Path) -> None:
+    rosbag1, typesys = pytest.importorskip("rosbags.rosbag1"), pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS1_NOETIC)
+    kind = "std_msgs/msg/Float64"
+    with rosbag1.Writer(tmp_path / "again.bag") as file:
+        runs = [file.add_connection("/angle", kind, typestore=store, callerid=node) for node in ("/a", "/b")]
+        for i in range(40):
+            message = store.types[kind](data=float(i))
+            file.write(runs[i // 20], START + i * 10_000_000, store.serialize_ros1(message, kind))
+    with open_channels(tmp_path / "again.bag") as file:
+        (angle,) = file.channels
+        np.testing.assert_array_equal(angle.load(), np.arange(40.0))

@@ -6,6 +6,7 @@ import json
 import shutil
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -119,6 +120,34 @@ def test_the_last_channel_is_taken_for_the_last_signal_and_asked_about(tmp_path:
     assert "init --model" in text
     assert "rigsight rigs NAME" in text
     np.testing.assert_array_equal(read_campaign(tmp_path).records[0]["x"], ANSWER)
+
+
+@pytest.mark.parametrize(
+    "further", [{}, {"velocity": ANSWER}, {"Oil [degC]": ANSWER}, {"row": np.arange(T.size)}]
+)
+def test_the_only_channel_that_can_drive_is_taken_for_the_input_and_asked_about(
+    tmp_path: Path, further: dict[str, Any]
+) -> None:
+    write_text(tmp_path / "a.csv", {"t": T, "demand": SWEEP, "x": ANSWER, **further}, {})
+    text = run_init(tmp_path, model="axis").path.read_text("utf-8")
+    assert 'u = "demand"' in text
+    assert "check" in next(line for line in text.splitlines() if line.startswith("u ="))
+    np.testing.assert_array_equal(read_campaign(tmp_path).records[0]["u"], SWEEP)
+
+
+@pytest.mark.parametrize(
+    "last",
+    [
+        {"demand": SWEEP, "request": ANSWER},
+        {"Oil [degC]": ANSWER},
+        {"row": np.arange(T.size)},
+        {"velocity": ANSWER},
+        {"still": 0.0 * T},
+    ],
+)
+def test_what_cannot_drive_or_is_not_alone_is_no_input(tmp_path: Path, last: dict[str, Any]) -> None:
+    write_text(tmp_path / "a.csv", {"t": T, "x": ANSWER, **last}, {})
+    assert 'u = "FILL IN"' in run_init(tmp_path, model="axis").path.read_text("utf-8")
 
 
 def test_a_last_channel_of_another_unit_is_not_taken(tmp_path: Path) -> None:

@@ -149,6 +149,8 @@ class TimeAxis:
     unit: str = "s"  # of dt, t0 and stamps
     # Moment from which they count, the same for all channels of a file; None where the file does not say.
     origin: np.datetime64 | None = None
+    late: float = 0.0  # time from the stamps until a logger received them [s]; 0 where that is what they are
+    notes: tuple[str, ...] = ()  # what was done to the stamps
 
     def stamps(self) -> Floats:
         """Return the time stamps, shape (n_samples,)."""

@@ -23,6 +23,8 @@ _CLEAR = 2.0
 _REGRESSION = ("x", "y")
 _MOVING, _TURNING = "x", "angle"
 """The position of one moving mass, and what it is called where it turns."""
+_READ = ("t", "x", "angle", "velocity", "acceleration")
+"""What sensors show that a rig may be without."""
 
 
 @dataclass(frozen=True)
@@ -167,7 +169,8 @@ def _completed_by_unit(
     found: FileGuess, channels: Sequence[Channel], times: Sequence[Channel]
 ) -> tuple[Guess, ...]:
     """Return the guesses; a signal without a match takes the only remaining channel with its unit, whatever its name."""
-    # The only output without a channel also takes the only remaining channel without a unit; an input may have no channel.
+    # The only output without a channel also takes the only remaining channel without a unit; so does the only input, of
+    # those that can drive.
     guesses = list(found.signals)
 
     def free() -> list[Channel]:
@@ -190,13 +193,25 @@ def _completed_by_unit(
             guesses[i] = _of_channel(guess, fitting[0])
     needed = (*(signal.name for signal in found.rig.inputs), *found.rig.required_outputs)
     lacking = [i for i, own in enumerate(guesses) if own.signal in needed and own.channel is None]
-    remaining = free()
-    if len(lacking) == len(remaining) == 1 and guesses[lacking[0]].signal in found.rig.required_outputs:
-        own, alone = guesses[lacking[0]], remaining[0]
-        unit = _unit_of(alone)
-        if not own.candidates and (unit is None or not has_si(own.si) or is_a(unit, own.si)):
-            guesses[lacking[0]] = replace(_of_channel(own, alone), assumed="the only remaining channel")
+    if len(lacking) == 1 and not guesses[lacking[0]].candidates:
+        own = guesses[lacking[0]]
+        is_output = own.signal in found.rig.required_outputs
+        remaining = free() if is_output else [c for c in free() if _may_drive(c, own)]
+        unit = _unit_of(remaining[0]) if len(remaining) == 1 else None
+        if len(remaining) == 1 and (unit is None or not has_si(own.si) or is_a(unit, own.si)):
+            absent = "" if is_output else "; or remove this line if nothing drove the rig"
+            assumed = f"the only remaining channel{absent}"
+            guesses[lacking[0]] = replace(_of_channel(own, remaining[0]), assumed=assumed)
     return tuple(guesses)
+
+
+def _may_drive(channel: Channel, signal: Guess) -> bool:
+    """Return True for a channel that changes, is no counter, and has neither the name of a reading nor another unit."""
+    unit = _unit_of(channel)
+    fits = unit is None or any(is_a(unit, own) for own in ([signal.si] if has_si(signal.si) else DRIVES))
+    is_read = any(closeness(channel.name, called) >= _CLEAR for called in _READ)
+    is_possible = fits and not is_read and may_be_command(channel.name, signal.si)
+    return is_possible and _moves(channel) and not _rises(channel)
 
 
 def _of_channel(guess: Guess, channel: Channel) -> Guess:
