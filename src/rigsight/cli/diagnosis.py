@@ -19,7 +19,6 @@ from rigsight.errors import InputError
 
 if TYPE_CHECKING:
     from rich.console import Group
-    from rich.table import Table
 
     from rigsight.plan import Plan
     from rigsight.workflow.power import Power
