@@ -41,6 +41,23 @@ def test_parameters_that_the_records_determine_and_those_that_act_together(both_
     assert status["x_off"] == status["force_off"] == "only with others"
 
 
+def test_numbers_given_far_off_leave_the_parameters_as_determined_as_they_are(both_ways: Check) -> None:
+    own = campaign(swept(), swept(30.0))
+    off = {**own.given, "m": 0.2, "d": 120.0, "k": 80.0}
+    errors, near = (
+        {p.name: p.relative_error for p in found.parameters}
+        for found in (check(replace(own, parameters=off)), both_ways)
+    )
+    assert all(errors[name] == pytest.approx(near[name], rel=0.1) for name in ("m", "d", "k"))
+
+
+def test_what_no_numbers_reproduce_is_not_said_to_be_determined_or_not(both_ways: Check) -> None:
+    own = campaign(swept(), swept(30.0))
+    turned = tuple(record.with_signals(x=-record["x"]) for record in own.records)
+    assert "100% of x unexplained" in check(replace(own, records=turned)).identifiability
+    assert "unexplained" not in both_ways.identifiability
+
+
 def test_laws_that_push_differently_are_told_apart_and_a_short_delay_is_a_lag(both_ways: Check) -> None:
     assert told(both_ways, "coulomb_friction", "quadratic_damping") == "apart"
     assert told(both_ways, "coulomb_friction", "cubic_stiffness") == "apart"
