@@ -13,6 +13,8 @@ from rigsight.check import Check, check_campaign
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.identify import OFFSETS_MEND
 from rigsight.records import Record
+from rigsight.rigs import RIGS
+from rigsight.simulate import compose, simulate
 from rigsight.workflow.campaign.read_campaign import campaign_of_records
 from rigsight.workflow.own.own_effects import candidates_of
 
@@ -41,6 +43,23 @@ def test_parameters_that_the_records_determine_and_those_that_act_together(both_
     assert status["x_off"] == status["force_off"] == "only with others"
 
 
+def test_numbers_given_far_off_leave_the_parameters_as_determined_as_they_are(both_ways: Check) -> None:
+    own = campaign(swept(), swept(30.0))
+    off = {**own.given, "m": 0.2, "d": 120.0, "k": 80.0}
+    errors, near = (
+        {p.name: p.relative_error for p in found.parameters}
+        for found in (check(replace(own, parameters=off)), both_ways)
+    )
+    assert all(errors[name] == pytest.approx(near[name], rel=0.1) for name in ("m", "d", "k"))
+
+
+def test_what_no_numbers_reproduce_is_not_said_to_be_determined_or_not(both_ways: Check) -> None:
+    own = campaign(swept(), swept(30.0))
+    turned = tuple(record.with_signals(x=-record["x"]) for record in own.records)
+    assert "100% of x unexplained" in check(replace(own, records=turned)).identifiability
+    assert "unexplained" not in both_ways.identifiability
+
+
 def test_laws_that_push_differently_are_told_apart_and_a_short_delay_is_a_lag(both_ways: Check) -> None:
     assert told(both_ways, "coulomb_friction", "quadratic_damping") == "apart"
     assert told(both_ways, "coulomb_friction", "cubic_stiffness") == "apart"
@@ -52,6 +71,30 @@ def test_no_motion_of_a_linear_rig_tells_where_its_delay_is() -> None:
     found = check(own, ("input_delay", "sensor_delay", "coulomb_friction"))
     assert told(found, "input_delay", "sensor_delay") == "alike"
     assert told(found, "input_delay", "coulomb_friction") == "apart"
+
+
+@pytest.mark.parametrize("noise", [0.0, 2e-3])
+def test_neither_the_ends_of_a_record_nor_noise_tell_where_a_delay_is(noise: float) -> None:
+    rng = np.random.default_rng(1)
+    own = campaign(swept(), swept(30.0))
+    cut = [record.slice(700, 2200) for record in own.records]
+    cut = [r.with_signals(x=r["x"] + noise * rng.standard_normal(r.n_samples)) for r in cut]
+    found = check(replace(own, records=tuple(cut)), ("input_delay", "sensor_delay", "time_shift"))
+    assert told(found, "input_delay", "sensor_delay") == "alike"
+    assert told(found, "input_delay", "time_shift") == "alike"
+
+
+def test_a_second_sensor_tells_where_a_delay_is() -> None:
+    numbers = {"J_m": 1e-3, "J_l": 4e-3, "k_s": 2.0, "d_s": 2e-3, "d_m": 1e-3, "d_l": 1e-3, "k_l": 0.5}
+    rig, records = RIGS["drive_train"], []
+    for i, u in enumerate((swept(3.0, n=1500), swept(9.0, n=1500))):
+        run = Record(f"run {i}", DT, {"u": u}, {})
+        records.append(simulate(compose(rig), {**numbers, "k_t": 0.05}, run))
+    found = check(
+        Campaign("drive train", rig, {"k_t": 0.05}, numbers, tuple(records)), ("input_delay", "sensor_delay")
+    )
+    late, *others = found.matrix.effects  # in the order of the catalogue
+    assert [told(found, late, other) for other in others] == ["apart", "apart"]
 
 
 def test_friction_shows_only_in_a_motion_in_both_directions() -> None:

@@ -19,10 +19,10 @@ from rigsight.diagnose.fit_context import start_values_of
 from rigsight.diagnose.noise.detection import NoiseFloor, noise_floors
 from rigsight.effects import Effect
 from rigsight.errors import SimulationError
-from rigsight.identify import GreyBoxFit, characteristic_scales
+from rigsight.identify import FitResult, GreyBoxFit, characteristic_scales
 from rigsight.identify.fit.windows import cut, liveliest, shown_by, window_length
 from rigsight.identify.identifiability import Identifiability, identifiability
-from rigsight.identify.information import POORLY_KNOWN, information
+from rigsight.identify.information import POORLY_KNOWN, information, listed
 from rigsight.identify.linear_view import longest_free_run, near_rest
 from rigsight.inverse import numbers_along_motion, with_all_inputs
 from rigsight.json_data import json_data
@@ -44,6 +44,10 @@ _WEAK = 0.1
 """Relative standard error from which a parameter is known badly (a convention)."""
 _EVALUATIONS = 60
 """Of a rough fit: near enough for what the records determine, not for the numbers."""
+_OF_START = 15
+"""Of a rough fit that tells which start is nearer."""
+_LARGER_PART = 0.5
+"""Share of a power, of a reading or of what another fit leaves."""
 _OF_MOTION = 0.99
 """Share of the power of the velocity below the end of the band of a motion."""
 _PER_PERIOD = 30.0
@@ -134,14 +138,15 @@ def check_campaign(campaign: Campaign, effects: Sequence[Effect], say: Callable[
     short = liveliest(coarser, rig, _OF_EFFECTS)
     floors = noise_floors(rig, campaign.records, campaign.drifts)
     say(PARTS[1])
-    values = _values(replace(campaign, records=coarser))
+    noise = {floor.output: floor.std for floor in floors}
+    values = _values(replace(campaign, records=coarser), short, noise)
     linear = _near_rest(campaign, short, values)
     found = remarks(campaign, short, liveliest(everything, rig, _OF_PARAMETERS), records, floors, linear)
     faulty = {(one.record or "", one.signal or "") for one in found if one.severity == "fault"}
     answers = amplitude_dependences(rig, coarser, faulty)
     say(PARTS[2])
     parameters, statement, left = _parameters(
-        campaign, liveliest(coarser, rig, _OF_PARAMETERS), values, {f.output: f.std for f in floors}, linear
+        campaign, liveliest(coarser, rig, _OF_PARAMETERS), values, noise, linear
     )
     found = with_offsets(found, rig, *left)
     say(PARTS[3])
@@ -150,13 +155,34 @@ def check_campaign(campaign: Campaign, effects: Sequence[Effect], say: Callable[
     return Check(campaign.title, rig.name, records, floors, found, answers, parameters, statement, matrix)
 
 
-def _values(campaign: Campaign) -> dict[str, float]:
-    """Return the given numbers; others follow from regressions of the records, without a fit where possible."""
+def _values(campaign: Campaign, short: Sequence[Record], noise: Mapping[str, float]) -> dict[str, float]:
+    """Return the numbers given, or those of a regression where rough fits of short records tell that they are nearer."""
     given = {**campaign.constants, **campaign.given}
-    if all(p.name in given for p in campaign.rig.parameters):
-        return given
-    along = None if _responds_in_spectra(campaign, given) else numbers_along_motion(campaign, given)
-    return {**(start_values_of(campaign) if along is None else along), **given}
+    regressed = _regressed(campaign, given)
+    near, far = {**regressed, **given}, {**given, **regressed}
+    if near == far:
+        return near
+    structure = compose(campaign.rig, campaign.modelled)
+    # Over pieces even a simulation with numbers that are far off stays in phase with the motion.
+    pieces = cut(short, window_length(campaign.rig, short))
+
+    def fitted(start: Mapping[str, float]) -> FitResult:
+        fit = GreyBoxFit(structure, pieces, characteristic_scales(campaign.rig, pieces, start), noise)
+        free = _free(campaign)
+        return fit.fit(start, free, max_evaluations=_OF_START, tolerance=1e-3, finish=False)
+
+    from_near, from_far = fitted(near), fitted(far)
+    return {**far, **from_far.values} if from_far.cost < _LARGER_PART * from_near.cost else near
+
+
+def _regressed(campaign: Campaign, given: Mapping[str, float]) -> dict[str, float]:
+    """Return numbers of the rig from regressions of the records; none where all are given and only a long search finds them."""
+    lacking = any(p.name not in given for p in campaign.rig.parameters)
+    is_short = _responds_in_spectra(campaign, given)
+    along = None if is_short else numbers_along_motion(campaign, given)
+    if along is not None:
+        return along
+    return start_values_of(campaign) if is_short or lacking else {}
 
 
 def _responds_in_spectra(campaign: Campaign, known: Mapping[str, float]) -> bool:
@@ -212,12 +238,8 @@ def _parameters(
         limit = min(window_length(rig, records), limit or np.inf)
     windows = cut(records, limit)
     scales = characteristic_scales(rig, windows, values)
-    held, factor = {campaign.absent_spring} if campaign.absent_spring else set(), campaign.open_factor
-    if factor is not None and factor.is_given:
-        held.add(factor.held)
-    free = [p.name for p in structure.parameters if p.name not in {*campaign.constants, *held}]
     fit = GreyBoxFit(structure, windows, scales, noise)
-    result = fit.fit({**values}, free, max_evaluations=_EVALUATIONS, tolerance=1e-3)
+    result = fit.fit({**values}, _free(campaign), max_evaluations=_EVALUATIONS, tolerance=1e-3)
     if not result.residuals:
         why = (
             "The equations cannot be simulated at these numbers, so what the records determine is not known."
@@ -229,10 +251,67 @@ def _parameters(
         CheckedParameter(name, units[name], _status(name, found), error)
         for name, error in found.relative_errors.items()
     )
+    factor = campaign.open_factor
     statement = " ".join(
-        [found.sentence, *([factor.sentence] if factor is not None and factor.is_given else [])]
+        [
+            *_held_at(campaign, values, noise, windows, result.residuals),
+            found.sentence,
+            *([factor.sentence] if factor is not None and factor.is_given else []),
+        ]
     )
     return parameters, statement, (windows, result.residuals)
+
+
+def _free(campaign: Campaign) -> list[str]:
+    """Return the names of the parameters that are judged."""
+    held, factor = {*campaign.constants}, campaign.open_factor
+    if campaign.absent_spring:
+        held.add(campaign.absent_spring)
+    if factor is not None and factor.is_given:
+        held.add(factor.held)
+    structure = compose(campaign.rig, campaign.modelled)
+    return [p.name for p in structure.parameters if p.name not in held]
+
+
+def _held_at(
+    campaign: Campaign,
+    values: Mapping[str, float],
+    noise: Mapping[str, float],
+    windows: Sequence[Record],
+    residuals: Sequence[Floats],
+) -> list[str]:
+    """Return sentences where parameters are judged at other numbers than those given, or at numbers that do not fit."""
+    rig, given = campaign.rig, campaign.given
+    others = [
+        f"{name} = {values[name]:.3g} instead of {given[name]:.3g}"
+        for name in sorted(rig.usually_positive & given.keys())
+        if abs(values[name] - given[name]) > _WEAK * abs(given[name])
+    ]
+    sentences = []
+    if others:
+        sentences.append(
+            "A fit from the numbers given stays far from the records. Parameters and effects are judged at numbers "
+            f"from a regression: {listed(others)}."
+        )
+    remaining = []
+    for column, signal in enumerate(rig.outputs):
+        seen = [
+            (w[signal.name], r[:, column])
+            for w, r in zip(windows, residuals, strict=True)
+            if signal.name in w
+        ]
+        if seen:
+            readings, own = (np.concatenate(parts) for parts in zip(*seen, strict=True))
+            known = noise[signal.name] ** 2
+            share = (np.mean(own**2) - known) / max(np.var(readings) - known, known)
+            if share > _LARGER_PART:
+                remaining.append(f"{min(share, 1.0):.0%} of {signal.name}")
+    if remaining:
+        sentences.append(
+            f"The nearest numbers leave {listed(remaining)} unexplained: unless that is noise, what is determined is not "
+            "known before the records or the equations are corrected. At these numbers:"
+        )
+    return sentences
 
 
 def _status(name: str, found: Identifiability) -> Status:

@@ -165,11 +165,11 @@ class RecordMotion:
         return np.array(np.broadcast_to(found, record.n_samples), dtype=np.float64)
 
     def with_reading_changed(
-        self, name: str, change: Floats, values: Mapping[str, float]
+        self, name: str, change: Floats, values: Mapping[str, float], rate: Floats | None = None
     ) -> tuple[Floats, Floats] | None:
         """Return the changes of `z` and `a` by small changes of one reading; None where it reads no coordinate or rate alone.
 
-        Changes, shape (.., n_samples), are smooth: they are differentiated as they are.
+        Changes, shape (.., n_samples), are smooth: they are differentiated as they are, unless their `rate` is known.
         """
         equations, n, dt = self.equations, self.equations.n_coordinates, self.record.dt
         p = equations.parameters(values, self.record)
@@ -182,11 +182,14 @@ class RecordMotion:
         of_sensors = np.moveaxis(slopes[:, first : first + n], 2, 0)
         if not np.any(np.ptp(of_sensors, axis=0)):
             of_sensors = of_sensors[:1]
-        by_reading = np.linalg.pinv(of_sensors)[:, :, own].T * change[..., None, :]
+        pinv = np.linalg.pinv(of_sensors)[:, :, own].T
+        by_reading = pinv * change[..., None, :]
         z = np.zeros((*change.shape[:-1], *self.z.shape))
         z[..., first : first + n, :] = by_reading
         if reads_place:
             z[..., n : 2 * n, :] = slope(by_reading, dt)
+            if rate is not None:
+                z[..., n : 2 * n, :] += pinv * (rate - slope(change, dt))[..., None, :]
         else:
             z[..., :n, :] = cumulative_trapezoid(by_reading, dx=dt, initial=0)
         return z, slope(z[..., n : 2 * n, :], dt)

@@ -25,8 +25,16 @@ def late_reading(
     """Return what a late reading takes from the equations, shape (n_equations, n_samples); None where it takes nothing."""
     if name not in motion.record:
         return None
-    reading = motion.filtered(motion.record[name])
-    return influence(motion, by_motion, values, name, shifted(reading, motion.record.dt, late) - reading)
+    if not motion.equations.n_states:
+        reading = motion.filtered(motion.record[name])
+        return influence(motion, by_motion, values, name, shifted(reading, motion.record.dt, late) - reading)
+    # As the smooth motion shows it: a late drive moves that motion, and noise of the reading would tell the two apart. Its rate
+    # by itself: a reading that stands still beyond the end of the record would stop there.
+    equations, own = motion.equations, motion.equations.sensor_names.index(name)
+    at = motion.z, motion.u, equations.parameters(values, motion.record)
+    shown = motion.filtered(np.array([equations.readings(*at)[own], equations.reading_slopes(*at)[own]]))
+    change, rate = (shifted(row, motion.record.dt, late) - row for row in shown)
+    return influence(motion, by_motion, values, name, change, rate)
 
 
 def of_sensor(
@@ -80,7 +88,12 @@ def of_sensor(
 
 
 def influence(
-    motion: RecordMotion, by_motion: Floats, values: Mapping[str, float], name: str, change: Floats
+    motion: RecordMotion,
+    by_motion: Floats,
+    values: Mapping[str, float],
+    name: str,
+    change: Floats,
+    rate: Floats | None = None,
 ) -> Floats | None:
     """Return the change of the residual of the rig's equations by small changes of a reading, shape (.., n_samples).
 
@@ -92,5 +105,5 @@ def influence(
         rows = np.zeros((*change.shape[:-1], len(motion.sensors), change.shape[-1]))
         rows[..., [motion.equations.sensor_names[i] for i in motion.sensors].index(name), :] = -change
         return rows
-    moved = motion.with_reading_changed(name, change, values)
+    moved = motion.with_reading_changed(name, change, values, rate)
     return None if moved is None else along_change(by_motion, moved)

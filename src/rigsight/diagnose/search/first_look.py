@@ -74,12 +74,13 @@ def look_at(
     free = tuple(name for name in structure.names if name in moved)
     starts = list(start_values(context, structure, effects[-1], base, parents))
     # Readings without their sign lead a fit of the equations alone to the numbers of another motion.
+    origin = base
     if context.given and (context.leaves_numbers_open(base) or effects[-1].loses_sign):
-        from_given = replace(base, values={**base.values, **context.given})
-        starts += start_values(context, structure, effects[-1], from_given, {})
+        origin = replace(base, values={**base.values, **context.given})
+        starts += start_values(context, structure, effects[-1], origin, {})
     beside = {name: value for name, value in numbers.items() if name in free}
     own_starts = [
-        {**starts[0], **with_own_values(structure, effects[-1], base, own), **beside} for own in further
+        {**starts[0], **with_own_values(structure, effects[-1], origin, own), **beside} for own in further
     ]
     starts = own_starts if are_enough and own_starts else [*starts, *own_starts]
     starts = [{**start, **known} for start in starts]

@@ -65,7 +65,7 @@ def single_models(
             f"The equations of {campaign.rig.name} cannot be fitted to the records: {reidentified.fit.message}"
         )
     say("re-identified")
-    known = {**campaign.constants, **reidentified.fit.values}
+    known = _known(campaign, context, reidentified)
     proposal = propose(campaign, known, effects, context.noise)
     say("missing force")
     offered = {kind_of(effect.name) for effect in candidates_on(campaign.rig, CATALOGUE, campaign.modelled)}
@@ -123,11 +123,16 @@ def held_by_motion(
 def _with_known_motion(campaign: Campaign, context: FitContext, reidentified: FittedModel) -> FitContext:
     """Return the context with scales from the motion and the forces between the sensors."""
     # These are known once the equations fit, or from the given simulation.
-    bent = bool(campaign.given) and context.leaves_numbers_open(reidentified.fit)
-    if not bent and campaign.rig.has_one_motion:
+    known = _known(campaign, context, reidentified)
+    if known.items() >= reidentified.fit.values.items() and campaign.rig.has_one_motion:
         return context
-    known = {**campaign.constants, **reidentified.fit.values, **(campaign.given if bent else {})}
     return replace(context, scales=characteristic_scales(campaign.rig, campaign.estimation, known))
+
+
+def _known(campaign: Campaign, context: FitContext, reidentified: FittedModel) -> dict[str, float]:
+    """Return the numbers of the equations fitted without an effect; those given where that fit leaves some of them open."""
+    is_bent = bool(campaign.given) and context.leaves_numbers_open(reidentified.fit)
+    return {**campaign.constants, **reidentified.fit.values, **(campaign.given if is_bent else {})}
 
 
 def _singles(
