@@ -45,7 +45,6 @@ from rigsight.effects.periodic_disturbance import PERIODIC_DISTURBANCE
 from rigsight.effects.pid_action import PID_ACTION
 from rigsight.effects.placed import AT, placed
 from rigsight.effects.position_dependent_damping import POSITION_DEPENDENT_DAMPING
-from rigsight.effects.power_law_damping import POWER_LAW_DAMPING
 from rigsight.effects.power_law_stiffness import POWER_LAW_STIFFNESS
 from rigsight.effects.presliding_friction import PRESLIDING_FRICTION
 from rigsight.effects.quadratic_damping import QUADRATIC_DAMPING
@@ -73,7 +72,6 @@ CATALOGUE: tuple[Effect, ...] = (
     PRESLIDING_FRICTION,
     LUGRE_FRICTION,
     QUADRATIC_DAMPING,
-    POWER_LAW_DAMPING,
     DIRECTIONAL_DAMPING,
     POSITION_DEPENDENT_DAMPING,
     CUBIC_STIFFNESS,

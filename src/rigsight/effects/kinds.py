@@ -31,7 +31,7 @@ limit = partial(Parameter, upper=1e300, null=1e300)
 
 _LARGEST = {
     "": 1.0, "x": 1e9, "x^-1": 1e12, "time": 1e6, "time^-1": 1e12, "x time^-1": 1e12, "input": 1e300, "drive": 1e12,
-    "force x^-1": 1e18, "force time x^-1": 1e18, "force time x^-3": 1e18, "force time^2 x^-1": 1e12, "force time^2 x^-2": 1e15,
+    "force x^-1": 1e18, "force time x^-3": 1e18, "force time^2 x^-1": 1e12, "force time^2 x^-2": 1e15,
 }  # fmt: skip
 _LEAST = {"x": 1e-12, "x^-1": 1e-9, "time": 1e-9, "time^-1": 1e-9, "x time^-1": 1e-12}
 """Ends of the range of a number by its dimension, where the effect gives none: beyond all that occurs."""
