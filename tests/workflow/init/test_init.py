@@ -33,6 +33,15 @@ def test_clear_names_make_a_campaign_at_once(tmp_path: Path) -> None:
     assert campaign.records[0].amplitude == pytest.approx(2.0, rel=0.02)
 
 
+def test_a_single_channel_is_the_reading_of_a_free_motion(tmp_path: Path) -> None:
+    """Its name is that of an input: what a coil gives."""
+    write_text(tmp_path / "blow.csv", {"t": T, "voltage": ANSWER}, {})
+    draft = run_init(tmp_path)
+    assert (draft.model, draft.n_blanks) == ("axis", 0)
+    (record,) = tomllib.loads((tmp_path / "campaign.toml").read_text("utf-8"))["records"]
+    assert record["columns"] == {"x": "voltage"}
+
+
 @pytest.mark.slow
 def test_units_in_names_are_written_and_applied(tmp_path: Path) -> None:
     odd = {"Zeit [ms]": 1e3 * T, "Anregung": SWEEP, "Signal/Weg mm": 1e3 * ANSWER, "Temperatur": ANSWER}

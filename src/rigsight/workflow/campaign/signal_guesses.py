@@ -177,6 +177,16 @@ def _completed_by_unit(
         taken = [found.time.channel, found.reference.channel, *times, *(own.channel for own in guesses)]
         return [c for c in channels if c not in taken]
 
+    alone = [c for c in channels if c not in times and c is not found.time.channel]
+    if len(alone) == len(found.rig.required_outputs) == 1:
+        # Without a reading there is no record: a single channel is that of a motion that nothing drives, whatever its name.
+        read = next(own for own in guesses if own.signal in found.rig.required_outputs)
+        unit = _unit_of(alone[0])
+        if unit is None or not has_si(read.si) or is_a(unit, read.si):
+            only = replace(
+                _of_channel(read, alone[0]), assumed=read.assumed if read.is_clear else "the only channel"
+            )
+            guesses = [only if own is read else Guess(own.signal, own.si) for own in guesses]
     for i, guess in enumerate(guesses):
         angles = [c for c in free() if closeness(c.name, _TURNING) >= _CLEAR]
         # One moving mass may turn as well; only once its rig is chosen, because rigs of several motions have angles beside x.
