@@ -133,10 +133,22 @@ def _smallest(
     if first is None:
         return _none(terms_of, effect, f"Not named at any size up to {_SIZES[-1]:g} times the usual one.")
     for size in _SIZES[first] * np.geomspace(_SIZES[0] / _SIZES[1], _SIZES[1] / _SIZES[0], 2 * _STEPS + 1):
-        at_all, *drawn = named(float(size))
-        if at_all and np.mean(drawn) >= NAMED_IN:
+        draws = named(float(size))
+        if next(draws) and _is_mostly(draws):
             return _at(terms_of, effect, float(size))
     return _none(terms_of, effect, f"Named in less than {NAMED_IN:.0%} of the resamplings at any size tried.")
+
+
+def _is_mostly(draws: Iterator[bool]) -> bool:
+    """Return whether `NAMED_IN` of the resamplings are true; no more are drawn than decide it."""
+    missed = 0
+    for n, named in enumerate(draws, 1):
+        missed += not named
+        if missed > (1.0 - NAMED_IN) * _RESAMPLINGS:
+            return False
+        if n - missed >= NAMED_IN * _RESAMPLINGS:
+            return True
+    return False
 
 
 def _at(terms_of: EffectTerms, effect: Effect, size: float) -> NamedSize:

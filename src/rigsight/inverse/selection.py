@@ -191,11 +191,15 @@ class Selection:
         return bool(before - after > max(max(WORTH, self.by_chance) * before, of_laws))
 
     def names(self, rig: Rig, key: Key, known: Sequence[tuple[Key, int, float]]) -> bool:
-        """Return whether a family at a place is taken first beside known ones."""
+        """Return whether a family at a place is taken first beside known ones, or at another place that does the same."""
         chosen = self.columns_of(known)
-        best = self.best(rig, chosen, [own for own, _, _ in known])
-        first = min(best, key=lambda own: best[own][0], default=None)
-        return first == key and self.is_worth(best[key][0], self.regression.remainder(chosen))
+        before, best = self.regression.remainder(chosen), self.best(rig, chosen, [own for own, _, _ in known])
+        if key not in best:
+            return False
+        first = min(best, key=lambda own: best[own][0])
+        as_good = best[first][0] + LAW_ERROR**2 * (before - best[first][0])
+        is_first = first == key or (first[0] == key[0] and best[key][0] <= as_good)
+        return is_first and self.is_worth(best[key][0], before)
 
     def proposal(self, rig: Rig) -> Proposal:
         """Return what every family explains alone, and those that are taken."""

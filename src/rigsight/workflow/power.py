@@ -23,7 +23,8 @@ SCHEMA_VERSION = 1
 POWER_FILE = "power.json"
 FOUND_BY = (
     "The effect is added to the force along the measured motion of the estimation records, as they are, and the families are "
-    "selected again. It counts as named if its family at its place comes first beside those that the records show already."
+    "selected again. It counts as named if its family comes first beside those that the records show already, at its place or at "
+    "another one that does the same."
 )
 
 
