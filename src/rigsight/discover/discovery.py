@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from rigsight.discover.along_motion import AlongMotion
-from rigsight.discover.assembly import BY_NOISE, Found, assembled
+from rigsight.discover.assembly import Found, assembled
 from rigsight.discover.bench import Attempt, Bench, Trial
 from rigsight.discover.own_laws import offered_shape
 from rigsight.discover.records import DiscoveryData, split
 from rigsight.discover.result import Discovery
-from rigsight.discover.selection import select
+from rigsight.discover.selection import BY_NOISE, select
 from rigsight.discover.terms import offered_terms
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError

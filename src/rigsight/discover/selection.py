@@ -15,14 +15,18 @@ import numpy as np
 
 from rigsight.discover.along_motion import AlongMotion, Proposed
 from rigsight.discover.bench import HOPELESS, Attempt, Bench, Support, Trial
+from rigsight.discover.input_noise import error_of_inputs
 from rigsight.discover.stability import information_criterion
 from rigsight.effects import Effect
 from rigsight.errors import SimulationError
+from rigsight.inverse.effect_terms import is_late, lateness
 from rigsight.records.record import Floats
 from rigsight.simulate import carried_over
 
 STRONG = 10.0
 """Difference of the criterion that counts as decided (Kass and Raftery 1995: very strong evidence)."""
+BY_NOISE = 1.5
+"""Error in noise floors up to which it may be noise of the sensors; above, something else is missing."""
 _BARE = 2.0
 """Difference that is not worth more than a bare mention (the same)."""
 _MOST_TERMS = 5
@@ -69,6 +73,15 @@ def at_floor(trial: Trial) -> bool:
     )
 
 
+def _is_noise_of_inputs(bench: Bench, trial: Trial) -> bool:
+    """Return True if noise of the inputs can leave as much, but for chance, and noise of the sensors cannot."""
+    if not BY_NOISE < trial.error_over_noise < math.inf:
+        return False
+    of_inputs = error_of_inputs(trial.fit, bench.estimation, bench.noise)
+    by_chance = 1.0 + _CHANCE / math.sqrt(2.0 * independent_samples(trial))
+    return trial.error_over_noise <= by_chance * math.hypot(1.0, of_inputs)
+
+
 def criterion(trial: Trial, independent: float) -> float:
     """Return the information criterion of the error of a fit."""
     if not np.isfinite(trial.error_over_noise):
@@ -105,7 +118,7 @@ def select(
             for trial in _to_extend(bench, pool, best) if along is not None else [best]:
                 longer += search.longer(trial)
         pool += search.tried(longer)
-        pool += bench.shortened(shorter, best) + search.tried(search.special_cases(best))
+        pool += bench.shortened(shorter, best) + search.tried(search.exchanged(best))
         found = _fewest(bench, pool)
         if found is best and number > 0:
             break
@@ -114,6 +127,12 @@ def select(
         raise SimulationError(
             f"The equations of {bench.rig.name} cannot be simulated near these records: {best.fit.message}"
         )
+    while along is not None and (name := along.by_chance(best.fit)):
+        (without,) = bench.shortened([best.support - {name}], best)
+        if not _is_noise_of_inputs(bench, without):
+            break
+        best = without
+        pool.append(best)
     independent = _independent_of(pool)
     by_support: dict[Support, Trial] = {}
     for trial in sorted(pool, key=lambda t: criterion(t, independent)):
@@ -169,17 +188,47 @@ class _Search:
         starts = [{**carried, **start} for start in regressed]
         return Attempt(support, [*starts, {**regressed[0], **carried}])
 
-    def special_cases(self, trial: Trial) -> list[Attempt]:
-        """Return the attempts with a special case in place of a term: a regression may prefer a complex term to a simple one."""
+    def exchanged(self, trial: Trial) -> list[Attempt]:
+        """Return the attempts with another form in place of a term.
+
+        A regression may prefer a complex term to its special case, and to it a delay and a lag at one place are the same.
+        """
         effects = self.bench.effects
         found = []
         for name in sorted(trial.support):
+            found += self._as_late(trial, effects[name])
             for parent in effects[name].parents:
                 if self.along is None or parent not in effects or parent in trial.support:
                     continue
                 proposed = self.along.instead(trial.fit, effects[name], effects[parent])
                 if proposed is not None:
                     found.append(self.attempt(proposed, trial))
+        return found
+
+    def _as_late(self, trial: Trial, effect: Effect) -> list[Attempt]:
+        """Return the attempts with another delay or lag at the place of one, as late as this one.
+
+        Another term may make up for the difference of both. So a fit also starts without each of them.
+        """
+        bench, found = self.bench, list[Attempt]()
+        if not is_late(effect):
+            return []
+        late = lateness(effect, trial.fit.structure.values_of(effect, trial.fit.all_values))
+        for other in bench.effects.values():
+            is_alike = is_late(other) and bench.rig.acts_at(other) == bench.rig.acts_at(effect)
+            if is_alike and other.name not in trial.support:
+                support = trial.support - {effect.name} | {other.name}
+                structure = bench.structure(support)
+                (own,) = (p.name for p in other.parameters if p.fitted)
+                start = {**bench.carried(trial.fit, structure), structure.parameter_name(other, own): late}
+                beside = [bench.effects[name] for name in sorted(support - {other.name})]
+                absent = [
+                    {structure.parameter_name(e, p.name): p.null for p in e.parameters if p.null is not None}
+                    for e in beside
+                ]
+                found.append(
+                    Attempt(support, [start, *({**start, **without} for without in absent if without)])
+                )
         return found
 
     def tried(self, attempts: Sequence[Attempt]) -> list[Trial]:
