@@ -85,3 +85,13 @@ def test_the_missing_force_of_a_motion_that_drifts_has_its_true_size() -> None:
     # Friction of 0.03 N m; the noise of the gyro, differentiated, adds to it.
     assert 0.02 < float(np.sqrt(np.mean(force**2))) < 0.1
     assert float(np.corrcoef(force, np.concatenate([m.some(np.sign(m.z[1])) for m in motions]))[0, 1]) > 0.5
+
+
+def test_rows_of_a_motion_that_drifts_count_wherever_it_moves() -> None:
+    t = DT * np.arange(1000)
+    moves = t > 4.0
+    swing = swings()[0].with_signals(gyro=VALUES["zero"] + np.where(moves, np.sin(4.0 * t), 0.0))
+    motion = record_motion(PENDULUM, swing, VALUES)
+    assert motion is not None
+    assert motion.drifts
+    assert np.mean(motion.row_weights > 0.0) == pytest.approx(np.mean(moves), abs=0.05)

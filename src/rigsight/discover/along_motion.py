@@ -17,7 +17,7 @@ from rigsight.discover.stability import inclusion_probabilities
 from rigsight.effects import Effect, Family
 from rigsight.identify import FitResult
 from rigsight.inverse import MissingForce, along_motion, missing_forces, selection_of
-from rigsight.inverse.effect_terms import EffectTerms, is_joint_force
+from rigsight.inverse.effect_terms import EffectTerms, is_joint_force, is_late
 from rigsight.inverse.equation_fit import LAW_ERROR, EquationFit
 from rigsight.inverse.joint_force import effect_force, joint_motion
 from rigsight.inverse.measured_motion import WIDER
@@ -149,11 +149,17 @@ class AlongMotion:
         return self._proposed(wider, len(chosen.selection.terms))
 
     def inclusion(self, fit: FitResult, rng: np.random.Generator) -> dict[str, float]:
-        """Return how often sparse regression selects each term of an equation, and the best others that are not its rivals."""
+        """Return how often sparse regression selects each term of an equation, and the best others that are not its rivals.
+
+        A delay or a lag is not asked: what it takes from the force looks like what smoothing does, and only fits tell. Those of
+        the equation are fitted beside the others.
+        """
         chosen = self._of_equation(fit)
         there = {effect.name for effect in fit.structure.effects}
         regression = chosen.selection.regression
-        directions = np.linalg.qr(regression.matrix[:, regression.own])[0]
+        late = [i for i in chosen.terms if is_late(chosen.selection.terms[i].effect)]
+        beside = [*regression.own, *(c for i in late for c in chosen.selection.places[i])]
+        directions = np.linalg.qr(regression.matrix[:, beside])[0]
 
         def column(i: int) -> Floats:
             """Return a term mixed as it is beside the others, without what numbers of the rig do, of length one."""
@@ -163,12 +169,13 @@ class AlongMotion:
             mixed = mixed - directions @ (directions.T @ mixed)
             return np.asarray(mixed / max(float(np.linalg.norm(mixed)), np.finfo(np.float64).tiny))
 
-        columns = {i: column(i) for i in chosen.terms}
-        for _, i in self._best_of_each(chosen, self._names - there):
+        columns = {i: column(i) for i in chosen.terms if i not in late}
+        asked = {t.effect.name for t in self._selection.terms if not is_late(t.effect)}
+        for _, i in self._best_of_each(chosen, asked - there):
             if len(columns) >= max(_COMPETING, len(chosen.terms)):
                 break
             further = column(i)
-            if all(abs(float(further @ columns[own])) < _RIVAL for own in chosen.terms):
+            if all(abs(float(further @ columns[own])) < _RIVAL for own in chosen.terms if own not in late):
                 columns[i] = further
         if not columns:
             return {}
@@ -177,6 +184,16 @@ class AlongMotion:
         found = inclusion_probabilities(matrix, target, regression.n_rows / WIDER, rng)
         names = [chosen.selection.terms[i].effect.name for i in columns]
         return dict(zip(names, map(float, found), strict=True))
+
+    def by_chance(self, fit: FitResult) -> str | None:
+        """Return the name of the term of an equation that removes least of the force, if that is no more than chance removes."""
+        chosen, shares = self._of_equation(fit), dict[str, float]()
+        for i in chosen.terms:
+            others = _Chosen(chosen.selection, tuple(other for other in chosen.terms if other != i))
+            left = self._left(others, chosen.selection.places[i])
+            shares[chosen.selection.terms[i].effect.name] = 1.0 - left / self._left(others, ())
+        least = min(shares, key=lambda name: shares[name], default=None)
+        return None if least is None or shares[least] > self._selection.by_chance else least
 
     def missing(self, fit: FitResult, joint: str) -> tuple[MissingForce, Floats]:
         """Return the force at a joint beside the terms that an equation has elsewhere, and its law there, shape (n_rows,)."""

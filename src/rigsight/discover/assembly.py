@@ -10,9 +10,10 @@ import numpy as np
 import sympy as sp
 
 from rigsight.discover.along_motion import AlongMotion
-from rigsight.discover.bench import Bench, Trial
+from rigsight.discover.bench import Bench, Support, Trial
+from rigsight.discover.input_noise import error_of_inputs
 from rigsight.discover.own_laws import own_laws
-from rigsight.discover.records import DiscoveryData, strength
+from rigsight.discover.records import DiscoveryData, same_input, strength
 from rigsight.discover.result import (
     Alternative,
     Coefficient,
@@ -23,14 +24,13 @@ from rigsight.discover.result import (
     Run,
     Term,
 )
-from rigsight.discover.selection import STRONG, Selection, criterion
+from rigsight.discover.selection import BY_NOISE, STRONG, Selection, criterion, independent_samples
 from rigsight.discover.terms import POWERS
 from rigsight.effects import Effect
 from rigsight.effects.placed import kind_of
 from rigsight.identify import FitResult
 from rigsight.metrics import rms
 from rigsight.records.record import Floats, Record
-from rigsight.records.signals import same_signal
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure
 from rigsight.simulate.model import Model
@@ -82,17 +82,12 @@ def _rounded(equation: ShownEquation) -> ShownEquation:
 
 _ZERO = 3.0
 _VAGUE = 0.05
-BY_NOISE = 1.5
-"""Held-out error in noise floors up to which it may be noise; above, an effect is still missing."""
 _NOISY = 0.1
 """Noise floor, relative to the motion, from which it may mask terms."""
-_MOST_NAMED = 3
-_SAME_RATE = 1e-6
-"""Relative difference up to which sample times, computed from time columns, count as equal."""
 _AT_BOUND = 0.1
 """Distance in standard errors at which a parameter is at a bound."""
 _NEAR = 1.5
-"""Factor of the held-out error within which another equation is nearly as good."""
+"""Factor of the error within which another equation is nearly as good."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +99,8 @@ class Found:
     how: str
     bench: Bench
     selection: Selection
-    judged: Trial
+    errors: Mapping[Support, float]  # of all tried equations on the held-out records, in noise floors
+    judged: Trial  # the chosen one there
     final: FitResult
     along: AlongMotion | None
     inclusion: Mapping[str, float]
@@ -136,7 +132,7 @@ def warnings_of(data: DiscoveryData, stages: Found, terms: Sequence[Term], floor
     if max(sizes) < 1.2 * min(sizes):
         found.append(_one_amplitude(selection, chosen))
     sources = [signal.name for signal in data.rig.inputs]
-    found += _same_input(sources, stages.estimation, stages.held_out) if sources else []
+    found += same_input(sources, stages.estimation, stages.held_out) if sources else []
     best = criterion(chosen, selection.independent)
     rivals = [
         trial
@@ -158,7 +154,7 @@ def warnings_of(data: DiscoveryData, stages: Found, terms: Sequence[Term], floor
         )
     extra = sorted({name for trial in richer for name in trial.support - chosen.support})
     if extra:
-        found.append(f"In doubt: {', '.join(extra)}. It lowers the held-out error, but not significantly.")
+        found.append(f"In doubt: {', '.join(extra)}. It lowers the error of the fit, but not significantly.")
     if floor > _NOISY:
         found.append(
             f"The noise is {100.0 * floor:.0f} % of the held-out motion, too high to decide on terms that change the motion by "
@@ -195,7 +191,13 @@ def _still_missing(stages: Found) -> list[str]:
     error = stages.judged.error_over_noise
     if error <= BY_NOISE:
         return []
-    if stages.along is None:
+    of_inputs = error_of_inputs(stages.judged.fit, stages.bench.held_out, stages.bench.noise)
+    if of_inputs > 1.0:
+        outside = (
+            "Noise of the measured inputs, if their fastest changes are noise that does not reach the rig, leaves "
+            f"{of_inputs:.1f}; what exceeds that is an effect that is missing, or a disturbance."
+        )
+    elif stages.along is None:
         outside = "An effect is still missing, or disturbances are larger than the noise floor."
     else:
         outside = (
@@ -210,26 +212,6 @@ def _still_missing(stages: Found) -> list[str]:
     return [
         f"The equations leave {error:.1f} times the noise floor in free run on the held-out records. {outside} Standard errors "
         "count what scatters, not what is missing: they are too small here."
-    ]
-
-
-def _same_input(
-    sources: Sequence[str], estimation: Sequence[Record], held_out: Sequence[Record]
-) -> list[str]:
-    """Return a warning about held-out records that have the same input as a fitted one."""
-    twins = {
-        record.name: fitted.name
-        for record in held_out
-        for fitted in estimation
-        if math.isclose(record.dt, fitted.dt, rel_tol=_SAME_RATE)
-        and all(same_signal(record[source], fitted[source]) for source in sources)
-    }
-    if not twins:
-        return []
-    listed = "; ".join(f"'{name}' as '{fitted}'" for name, fitted in list(twins.items())[:_MOST_NAMED])
-    return [
-        f"Held-out records have the input of fitted ones: {listed}. With the same input even wrong terms may fit, so the error "
-        f"says little about other motion. Add a validation record with another waveform or amplitude."
     ]
 
 
@@ -280,12 +262,12 @@ def assembled(data: DiscoveryData, found: Found) -> Discovery:
         latex=latex,
         rig_parameters={name: c for name, c in coefficients_of(final).items() if name in own},
         terms=terms,
-        alternatives=tuple(_alternative(trial, selection) for trial in selection.trials),
+        alternatives=tuple(_alternative(trial, found) for trial in selection.trials),
         held_out=tuple(_held_out(data, record, runs) for record in found.held_out),
         held_out_error=judged.error_over_noise,
         held_out_nrmse=error,
         noise_floor=floor,
-        independent=selection.independent,
+        independent=independent_samples(judged),
         runs=runs,
         output=rig.outputs[0].name,
         unit=rig.outputs[0].unit,
@@ -355,9 +337,8 @@ def _terms(found: Found) -> tuple[Term, ...]:
         names = [structure.parameter_name(effect, p.name) for p in effect.parameters]
         own = {name: coefficients[name] for name in names if name in coefficients}
         terms.append(_term(found, effect, own))
-    there = set(structure.effect_names)
     fitted = {name for trial in found.selection.trials for name in trial.support}
-    others = {*inclusion, *fitted} - there
+    others = {*inclusion, *fitted} - {*structure.effect_names}
     offered = [_term(found, found.bench.effects[name]) for name in sorted(others)]
     tried = [term for term in offered if math.isfinite(term.otherwise)]
     rest = [term for term in offered if term not in tried]
@@ -377,14 +358,14 @@ def _term(found: Found, effect: Effect, own: Mapping[str, Coefficient] | None = 
         doubt=doubts(effect, own or {}),
         where=effect.at or "",
         family="" if kind in POWERS else str(effect.family),
-        otherwise=found.selection.otherwise(effect.name),
+        otherwise=found.errors.get(found.selection.best.support ^ {effect.name}, math.nan),
     )
 
 
-def _alternative(trial: Trial, selection: Selection) -> Alternative:
-    bic = criterion(trial, selection.independent)
-    aic = bic - trial.n_free * (math.log(selection.independent) - 2.0)
-    return Alternative(tuple(sorted(trial.support)), trial.n_free, trial.error_over_noise, aic, bic)
+def _alternative(trial: Trial, found: Found) -> Alternative:
+    bic = criterion(trial, found.selection.independent)
+    aic = bic - trial.n_free * (math.log(found.selection.independent) - 2.0)
+    return Alternative(tuple(sorted(trial.support)), trial.n_free, found.errors[trial.support], aic, bic)
 
 
 def _runs(data: DiscoveryData, found: Found) -> tuple[Run, ...]:

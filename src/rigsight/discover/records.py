@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -11,10 +12,14 @@ import numpy as np
 from rigsight.campaign import Campaign
 from rigsight.errors import InputError
 from rigsight.records import Record
+from rigsight.records.signals import same_signal
 from rigsight.rigs import Rig
 
 _LEAST_SAMPLES = 200
 _HELD_BACK = 0.3
+_MOST_NAMED = 3
+_SAME_RATE = 1e-6
+"""Relative difference up to which sample times, computed from time columns, count as equal."""
 
 
 @dataclass(frozen=True)
@@ -66,13 +71,13 @@ def split(data: DiscoveryData) -> tuple[tuple[Record, ...], tuple[Record, ...], 
         return (
             rest,
             (middle,),
-            f"There is no validation record; '{middle.name}' was set aside to select the terms.",
+            f"There is no validation record; '{middle.name}' was set aside and chose no term.",
         )
     cut = int((1.0 - _HELD_BACK) * estimation[0].n_samples)
     return (
         (estimation[0].slice(0, cut),),
         (replace(estimation[0].slice(cut, None), name=f"{estimation[0].name} (end)"),),
-        "There is a single record; its last part was set aside to select the terms, so no other amplitude is tested.",
+        "There is a single record; its last part was set aside and chose no term, but no other amplitude is tested.",
     )
 
 
@@ -80,3 +85,21 @@ def strength(rig: Rig, record: Record) -> float:
     """Return the size of the inputs of a record, or of the outputs of a rig without inputs."""
     names = [signal.name for signal in rig.inputs or rig.outputs]
     return float(np.sqrt(sum(np.var(record[name]) for name in names if name in record)))
+
+
+def same_input(sources: Sequence[str], estimation: Sequence[Record], held_out: Sequence[Record]) -> list[str]:
+    """Return a warning about held-out records that have the same input as a fitted one."""
+    twins = {
+        record.name: fitted.name
+        for record in held_out
+        for fitted in estimation
+        if math.isclose(record.dt, fitted.dt, rel_tol=_SAME_RATE)
+        and all(same_signal(record[source], fitted[source]) for source in sources)
+    }
+    if not twins:
+        return []
+    listed = "; ".join(f"'{name}' as '{fitted}'" for name, fitted in list(twins.items())[:_MOST_NAMED])
+    return [
+        f"Held-out records have the input of fitted ones: {listed}. With the same input even wrong terms may fit, so the error "
+        f"says little about other motion. Add a validation record with another waveform or amplitude."
+    ]

@@ -1,8 +1,8 @@
-"""Selection of terms: every support is fitted by output error and judged by free-run simulation of held-out records.
+"""Selection of terms: every support is fitted by output error and judged by what its free runs leave of the fitted records.
 
-Regression along the motion proposes terms; this module selects them. A term must improve the fit to the held-out records by more
-than the penalty of the Bayesian information criterion for their independent samples; of two indistinguishable models the one with
-fewer terms is kept.
+Regression along the motion proposes terms; this module selects them. A term must improve the fit by more than the penalty of the
+Bayesian information criterion for its independent samples; of two indistinguishable models the one with fewer terms is kept.
+Held-out records choose nothing.
 """
 
 from __future__ import annotations
@@ -15,14 +15,18 @@ import numpy as np
 
 from rigsight.discover.along_motion import AlongMotion, Proposed
 from rigsight.discover.bench import HOPELESS, Attempt, Bench, Support, Trial
+from rigsight.discover.input_noise import error_of_inputs
 from rigsight.discover.stability import information_criterion
 from rigsight.effects import Effect
 from rigsight.errors import SimulationError
+from rigsight.inverse.effect_terms import is_late, lateness
 from rigsight.records.record import Floats
 from rigsight.simulate import carried_over
 
 STRONG = 10.0
 """Difference of the criterion that counts as decided (Kass and Raftery 1995: very strong evidence)."""
+BY_NOISE = 1.5
+"""Error in noise floors up to which it may be noise of the sensors; above, something else is missing."""
 _BARE = 2.0
 """Difference that is not worth more than a bare mention (the same)."""
 _MOST_TERMS = 5
@@ -31,9 +35,9 @@ _ROUNDS = 4
 _BESIDE = 2
 """Equations that are extended beside the best, if terms act at several joints."""
 _NEAR = 1.5
-"""Factor of the smallest held-out error up to which they are."""
+"""Factor of the smallest error up to which they are."""
 _RELEASED = 0.98
-"""Factor by which a released special value (an exponent of 1) must lower the held-out error to be kept."""
+"""Factor by which a released special value (an exponent of 1) must lower the error to be kept."""
 
 _FEWEST = 10.0
 """Independent samples that are assumed at least."""
@@ -44,7 +48,7 @@ _WHITE = 0.75
 
 
 def independent_samples(trial: Trial) -> float:
-    """Return the number of independent samples that is equivalent to the colored held-out errors of all outputs."""
+    """Return the number of independent samples that is equivalent to the colored errors of all outputs."""
     return sum(map(_independent, trial.shown)) or _FEWEST
 
 
@@ -59,7 +63,7 @@ def _independent(residuals: Floats) -> float:
 
 
 def at_floor(trial: Trial) -> bool:
-    """Return True if a held-out error is as small and as white as the noise: there is nothing left to explain."""
+    """Return True if an error is as small and as white as the noise: there is nothing left to explain."""
     n = sum(errors.size for errors in trial.shown)
     if n == 0:
         return False
@@ -69,8 +73,17 @@ def at_floor(trial: Trial) -> bool:
     )
 
 
+def _is_noise_of_inputs(bench: Bench, trial: Trial) -> bool:
+    """Return True if noise of the inputs can leave as much, but for chance, and noise of the sensors cannot."""
+    if not BY_NOISE < trial.error_over_noise < math.inf:
+        return False
+    of_inputs = error_of_inputs(trial.fit, bench.estimation, bench.noise)
+    by_chance = 1.0 + _CHANCE / math.sqrt(2.0 * independent_samples(trial))
+    return trial.error_over_noise <= by_chance * math.hypot(1.0, of_inputs)
+
+
 def criterion(trial: Trial, independent: float) -> float:
-    """Return the information criterion of a held-out error."""
+    """Return the information criterion of the error of a fit."""
     if not np.isfinite(trial.error_over_noise):
         return float("inf")
     return information_criterion(trial.error_over_noise**2, trial.n_free, independent)
@@ -82,21 +95,13 @@ class Selection:
 
     best: Trial  # the chosen support
     trials: tuple[Trial, ...]  # all polished supports, best first
-    independent: float  # number of independent samples of the held-out errors
-
-    def otherwise(self, term: str) -> float:
-        """Return the held-out error, in noise floors, of the equation without a term of its own or with another one.
-
-        NaN where this equation was not tried.
-        """
-        changed = self.best.support ^ {term}
-        return next((t.error_over_noise for t in self.trials if t.support == changed), math.nan)
+    independent: float  # number of independent samples of the errors
 
 
 def select(
     bench: Bench, linear: Trial, along: AlongMotion | None, progress: Callable[[str], None]
 ) -> Selection:
-    """Search for the support with the lowest held-out criterion, from the equation without any term on.
+    """Search for the support with the lowest criterion, from the equation without any term on.
 
     Where the sensors do not show the motion, every term is tried by a fit.
     """
@@ -113,7 +118,7 @@ def select(
             for trial in _to_extend(bench, pool, best) if along is not None else [best]:
                 longer += search.longer(trial)
         pool += search.tried(longer)
-        pool += bench.shortened(shorter, best) + search.tried(search.special_cases(best))
+        pool += bench.shortened(shorter, best) + search.tried(search.exchanged(best))
         found = _fewest(bench, pool)
         if found is best and number > 0:
             break
@@ -122,6 +127,12 @@ def select(
         raise SimulationError(
             f"The equations of {bench.rig.name} cannot be simulated near these records: {best.fit.message}"
         )
+    while along is not None and (name := along.by_chance(best.fit)):
+        (without,) = bench.shortened([best.support - {name}], best)
+        if not _is_noise_of_inputs(bench, without):
+            break
+        best = without
+        pool.append(best)
     independent = _independent_of(pool)
     by_support: dict[Support, Trial] = {}
     for trial in sorted(pool, key=lambda t: criterion(t, independent)):
@@ -177,17 +188,47 @@ class _Search:
         starts = [{**carried, **start} for start in regressed]
         return Attempt(support, [*starts, {**regressed[0], **carried}])
 
-    def special_cases(self, trial: Trial) -> list[Attempt]:
-        """Return the attempts with a special case in place of a term: a regression may prefer a complex term to a simple one."""
+    def exchanged(self, trial: Trial) -> list[Attempt]:
+        """Return the attempts with another form in place of a term.
+
+        A regression may prefer a complex term to its special case, and to it a delay and a lag at one place are the same.
+        """
         effects = self.bench.effects
         found = []
         for name in sorted(trial.support):
+            found += self._as_late(trial, effects[name])
             for parent in effects[name].parents:
                 if self.along is None or parent not in effects or parent in trial.support:
                     continue
                 proposed = self.along.instead(trial.fit, effects[name], effects[parent])
                 if proposed is not None:
                     found.append(self.attempt(proposed, trial))
+        return found
+
+    def _as_late(self, trial: Trial, effect: Effect) -> list[Attempt]:
+        """Return the attempts with another delay or lag at the place of one, as late as this one.
+
+        Another term may make up for the difference of both. So a fit also starts without each of them.
+        """
+        bench, found = self.bench, list[Attempt]()
+        if not is_late(effect):
+            return []
+        late = lateness(effect, trial.fit.structure.values_of(effect, trial.fit.all_values))
+        for other in bench.effects.values():
+            is_alike = is_late(other) and bench.rig.acts_at(other) == bench.rig.acts_at(effect)
+            if is_alike and other.name not in trial.support:
+                support = trial.support - {effect.name} | {other.name}
+                structure = bench.structure(support)
+                (own,) = (p.name for p in other.parameters if p.fitted)
+                start = {**bench.carried(trial.fit, structure), structure.parameter_name(other, own): late}
+                beside = [bench.effects[name] for name in sorted(support - {other.name})]
+                absent = [
+                    {structure.parameter_name(e, p.name): p.null for p in e.parameters if p.null is not None}
+                    for e in beside
+                ]
+                found.append(
+                    Attempt(support, [start, *({**start, **without} for without in absent if without)])
+                )
         return found
 
     def tried(self, attempts: Sequence[Attempt]) -> list[Trial]:
@@ -220,7 +261,7 @@ def _independent_of(trials: Sequence[Trial]) -> float:
 
 
 def _fewest(bench: Bench, trials: Sequence[Trial]) -> Trial:
-    """Return the trial with the fewest parameters of those that the held-out records do not distinguish from the best.
+    """Return the trial with the fewest parameters of those that the records do not distinguish from the best.
 
     With equal numbers of parameters, fewer states are preferred, then what was offered first: a loop with one state to a series
     of sliders with six, a cubic spring to a pendulum.

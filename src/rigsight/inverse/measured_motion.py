@@ -285,7 +285,7 @@ class RecordMotion:
         n = self.equations.n_coordinates
         speeds = np.abs(self.z[n : 2 * n])
         moves = [speed >= speed_at_rest(speed) for speed in speeds] or [np.ones(self.record.n_samples)]
-        moving = self.inner(np.array(moves, dtype=np.float64)) > _MOVES
+        moving = self._inside(self.smoothed(np.array(moves, dtype=np.float64))) > _MOVES
         moving |= ~np.any(moving, axis=1, keepdims=True)
         return np.asarray(moving / np.sqrt(np.mean(moving, axis=1, keepdims=True)))
 
