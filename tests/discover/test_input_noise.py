@@ -49,7 +49,7 @@ def bench_of(measured: tuple[Record, ...], names: tuple[str, ...]) -> tuple[Benc
     )
     assert along is not None
     bench = Bench(
-        rig=AXIS, estimation=measured, held_out=(), values=VALUES, scales=characteristic_scales(AXIS, measured, VALUES),
+        rig=AXIS, estimation=measured, held_out=measured, values=VALUES, scales=characteristic_scales(AXIS, measured, VALUES),
         noise=NOISE, held=frozenset({"gain", "force_off"}), effects=effects,
     )  # fmt: skip
     return bench, along

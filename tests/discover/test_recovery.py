@@ -15,6 +15,7 @@ from rigsight.discover.bench import Bench, Trial
 from rigsight.discover.discovery import discover
 from rigsight.discover.records import DiscoveryData
 from rigsight.discover.result import Discovery
+from rigsight.discover.selection import Selection, select
 from rigsight.effects import effect_named
 from rigsight.errors import SimulationError
 from rigsight.records import Record
@@ -162,6 +163,21 @@ def test_equations_that_cannot_be_simulated_are_told(
     _, data = make_data("linear", 2e-5, amplitudes=(0.3, 0.6), seconds=2.0)
     with pytest.raises(SimulationError, match="equations of axis cannot be simulated near these records"):
         discover(data)
+
+
+@pytest.mark.slow
+def test_a_chosen_equation_whose_score_stayed_rough_is_scored(
+    make_data: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def rough(*args: Any) -> Selection:
+        selection = select(*args)
+        return replace(selection, best=replace(selection.best, residuals=np.zeros(0)))
+
+    monkeypatch.setattr("rigsight.discover.discovery.select", rough)
+    _, data = make_data("linear", 2e-5, seconds=5.0, validation=False)
+    found = discover(data)
+    assert found.held_out_error == pytest.approx(1.0, abs=0.1)
+    assert [run.record for run in found.runs] == [own.record for own in found.held_out]
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import numpy as np
 import sympy as sp
 
 from rigsight.discover.along_motion import AlongMotion
-from rigsight.discover.bench import Bench, Support, Trial
+from rigsight.discover.bench import Bench, Trial
 from rigsight.discover.input_noise import error_of_inputs
 from rigsight.discover.own_laws import own_laws
 from rigsight.discover.records import DiscoveryData, same_input, strength
@@ -24,7 +24,7 @@ from rigsight.discover.result import (
     Run,
     Term,
 )
-from rigsight.discover.selection import BY_NOISE, STRONG, Selection, criterion, independent_samples
+from rigsight.discover.selection import BY_NOISE, STRONG, Selection, criterion
 from rigsight.discover.terms import POWERS
 from rigsight.effects import Effect
 from rigsight.effects.placed import kind_of
@@ -87,7 +87,7 @@ _NOISY = 0.1
 _AT_BOUND = 0.1
 """Distance in standard errors at which a parameter is at a bound."""
 _NEAR = 1.5
-"""Factor of the error within which another equation is nearly as good."""
+"""Factor of the held-out error within which another equation is nearly as good."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +99,7 @@ class Found:
     how: str
     bench: Bench
     selection: Selection
-    errors: Mapping[Support, float]  # of all tried equations on the held-out records, in noise floors
-    judged: Trial  # the chosen one there
+    judged: Trial
     final: FitResult
     along: AlongMotion | None
     inclusion: Mapping[str, float]
@@ -154,7 +153,7 @@ def warnings_of(data: DiscoveryData, stages: Found, terms: Sequence[Term], floor
         )
     extra = sorted({name for trial in richer for name in trial.support - chosen.support})
     if extra:
-        found.append(f"In doubt: {', '.join(extra)}. It lowers the error of the fit, but not significantly.")
+        found.append(f"In doubt: {', '.join(extra)}. It lowers the held-out error, but not significantly.")
     if floor > _NOISY:
         found.append(
             f"The noise is {100.0 * floor:.0f} % of the held-out motion, too high to decide on terms that change the motion by "
@@ -262,12 +261,12 @@ def assembled(data: DiscoveryData, found: Found) -> Discovery:
         latex=latex,
         rig_parameters={name: c for name, c in coefficients_of(final).items() if name in own},
         terms=terms,
-        alternatives=tuple(_alternative(trial, found) for trial in selection.trials),
+        alternatives=tuple(_alternative(trial, selection) for trial in selection.trials),
         held_out=tuple(_held_out(data, record, runs) for record in found.held_out),
         held_out_error=judged.error_over_noise,
         held_out_nrmse=error,
         noise_floor=floor,
-        independent=independent_samples(judged),
+        independent=selection.independent,
         runs=runs,
         output=rig.outputs[0].name,
         unit=rig.outputs[0].unit,
@@ -337,8 +336,9 @@ def _terms(found: Found) -> tuple[Term, ...]:
         names = [structure.parameter_name(effect, p.name) for p in effect.parameters]
         own = {name: coefficients[name] for name in names if name in coefficients}
         terms.append(_term(found, effect, own))
+    there = set(structure.effect_names)
     fitted = {name for trial in found.selection.trials for name in trial.support}
-    others = {*inclusion, *fitted} - {*structure.effect_names}
+    others = {*inclusion, *fitted} - there
     offered = [_term(found, found.bench.effects[name]) for name in sorted(others)]
     tried = [term for term in offered if math.isfinite(term.otherwise)]
     rest = [term for term in offered if term not in tried]
@@ -358,14 +358,14 @@ def _term(found: Found, effect: Effect, own: Mapping[str, Coefficient] | None = 
         doubt=doubts(effect, own or {}),
         where=effect.at or "",
         family="" if kind in POWERS else str(effect.family),
-        otherwise=found.errors.get(found.selection.best.support ^ {effect.name}, math.nan),
+        otherwise=found.selection.otherwise(effect.name),
     )
 
 
-def _alternative(trial: Trial, found: Found) -> Alternative:
-    bic = criterion(trial, found.selection.independent)
-    aic = bic - trial.n_free * (math.log(found.selection.independent) - 2.0)
-    return Alternative(tuple(sorted(trial.support)), trial.n_free, found.errors[trial.support], aic, bic)
+def _alternative(trial: Trial, selection: Selection) -> Alternative:
+    bic = criterion(trial, selection.independent)
+    aic = bic - trial.n_free * (math.log(selection.independent) - 2.0)
+    return Alternative(tuple(sorted(trial.support)), trial.n_free, trial.error_over_noise, aic, bic)
 
 
 def _runs(data: DiscoveryData, found: Found) -> tuple[Run, ...]:

@@ -1,8 +1,4 @@
-"""Fit and score of a set of terms (a support): output-error fit, its error, and free runs on held-out records.
-
-The error of a fit chooses the terms. Held-out records choose nothing: they are simulated with equations that were chosen without
-them.
-"""
+"""Fit and score of a set of terms (a support): output-error fit, then free runs on held-out records."""
 
 from __future__ import annotations
 
@@ -27,7 +23,7 @@ _FIRST_EVALUATIONS = 12
 HOPELESS = 10.0
 """Factor over the best RMS so far at which a support is given up after the first evaluations."""
 _FAR = 2.0
-"""Factor over the best error from which better initial states would not change the selection."""
+"""Factor over the best held-out error from which better initial states would not change the selection."""
 _TOLERANCE = 1e-5
 """Relative change of the cost at which a fit of the search stops, and a score: with ten thousand independent samples this is a
 hundredth of the decisive difference of the criterion."""
@@ -37,13 +33,13 @@ _FULL = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One polished support with its error on the fitted or on the held-out records."""
+    """One polished support with its held-out score."""
 
     support: Support  # names of the effects
     fit: FitResult  # output-error fit to the estimation records
-    error_over_noise: float  # RMS of the free-run error in units of the noise floors
-    # Errors in units of the noise floors, all records one after the other, shape (n_samples, n_outputs); NaN where nothing was
-    # measured, empty if a rough score was sufficient.
+    error_over_noise: float  # RMS of the held-out free-run error in units of the noise floors
+    # Held-out errors in units of the noise floors, all records one after the other, shape (n_samples, n_outputs); NaN
+    # where nothing was measured, empty if a rough score was sufficient.
     residuals: Floats
 
     @property
@@ -53,7 +49,7 @@ class Trial:
 
     @property
     def shown(self) -> list[Floats]:
-        """Errors of each output that was measured."""
+        """Held-out errors of each output that was measured."""
         columns = [column[np.isfinite(column)] for column in self.residuals.T]
         return [column for column in columns if column.size]
 
@@ -76,7 +72,7 @@ class Attempt:
 
 @dataclass(frozen=True, eq=False)
 class _RoughTrial:
-    """A fit with the records that score it, and the first evaluations of its score; None if it cannot be scored."""
+    """A fit with the first evaluations of its score; None if the fit is not scored."""
 
     support: Support
     fit: FitResult
@@ -85,7 +81,7 @@ class _RoughTrial:
 
     @property
     def error_over_noise(self) -> float:
-        """Upper limit of the error."""
+        """Upper limit of the held-out error."""
         return float("inf") if self.score is None else float(np.sqrt(self.score.cost / self.score.n_samples))
 
     def as_it_is(self) -> Trial:
@@ -177,16 +173,7 @@ class Bench:
 
     def scored(self, support: Support, fit: FitResult) -> Trial:
         """Simulate the held-out records with a fit; only their initial states are estimated, to full precision."""
-        return self._finely_scored(self._on_held_out(support, fit), _FULL)
-
-    def held_out_errors(self, trials: Sequence[Trial]) -> dict[Support, float]:
-        """Return the free-run errors of polished supports on the held-out records in noise floors, large ones roughly."""
-
-        def simulated(trial: Trial) -> _RoughTrial:
-            return self._on_held_out(trial.support, trial.fit)
-
-        scored = self._scored(list(self.threads.side_by_side(simulated, trials)))
-        return {trial.support: trial.error_over_noise for trial in scored}
+        return self._finely_scored(self._roughly_scored(support, fit), _FULL)
 
     def _polished(self, attempts: Sequence[Attempt], progress: Progress = lambda _: None) -> list[Trial]:
         """Fit and score; attempts far behind the best are not refined further.
@@ -210,17 +197,15 @@ class Bench:
                     finish=False,
                     substeps=fit.substeps,
                 )
-            return _RoughTrial(attempt.support, fit, problem, fit if np.isfinite(fit.cost) else None)
+            return self._roughly_scored(attempt.support, fit)
 
         rough = []
         for trial in self.threads.side_by_side(further, begun):
             progress(trial.support)
             rough.append(trial)
-        return self._scored(rough, [trial.error_over_noise for trial in self.trials.values()])
-
-    def _scored(self, rough: Sequence[_RoughTrial], known: Sequence[float] = ()) -> list[Trial]:
-        """Score more finely what is near the smallest of all errors."""
-        far = _FAR * min([*known, *(trial.error_over_noise for trial in rough)], default=float("inf"))
+        errors = [trial.error_over_noise for trial in self.trials.values()]
+        errors += [trial.error_over_noise for trial in rough]
+        far = _FAR * min(errors, default=float("inf"))
 
         def finished(trial: _RoughTrial) -> Trial:
             return self._finely_scored(trial) if trial.error_over_noise < far else trial.as_it_is()
@@ -260,7 +245,7 @@ class Bench:
                 best[number] = fit
         return [(attempt, problems[i], best[i]) for i, attempt in enumerate(attempts)]
 
-    def _on_held_out(self, support: Support, fit: FitResult) -> _RoughTrial:
+    def _roughly_scored(self, support: Support, fit: FitResult) -> _RoughTrial:
         problem = GreyBoxFit(fit.structure, self.held_out, self.scales, self.noise, threads=self.threads)
         if not np.isfinite(fit.cost):
             return _RoughTrial(support, fit, problem, None)

@@ -1,4 +1,4 @@
-"""The whole discovery: records and a rig -> regression along the motion, selection, refitted equations."""
+"""The whole discovery: records and a rig -> regression along the motion, held-out selection, refitted equations."""
 
 from __future__ import annotations
 
@@ -84,8 +84,11 @@ def discover(
     selection = select(bench, linear, along, say)
     chosen = selection.best
     final, held = _polished(data, bench, chosen)
-    # A record that was set aside is used in the final fit, too: it is unseen only for the fit that chose the equation.
-    judged = bench.scored(chosen.support, chosen.fit if how else final)
+    # A record that was set aside is used in the final fit too: it is unseen only for the selection of the equation.
+    judged = chosen if how else bench.scored(chosen.support, final)
+    if math.isfinite(judged.error_over_noise) and judged.residuals.size == 0:
+        # A short equation may be chosen although its error is so far above that of a longer one that its score stayed rough.
+        judged = bench.scored(chosen.support, judged.fit)
     if not math.isfinite(judged.error_over_noise):
         raise SimulationError("The refitted equations cannot be simulated on the held-out records.")
     check_predicts(judged.error_over_noise, bench.rig.name, bench.held_out, bench.noise)
@@ -95,10 +98,7 @@ def discover(
     shape = None
     if along is not None and judged.error_over_noise > BY_NOISE:
         shape = offered_shape(bench, along, chosen, say)
-    errors = bench.held_out_errors(selection.trials)
-    found = Found(
-        estimation, held_out, how, bench, selection, errors, judged, final, along, inclusion, held, shape
-    )
+    found = Found(estimation, held_out, how, bench, selection, judged, final, along, inclusion, held, shape)
     return assembled(data, found)
 
 

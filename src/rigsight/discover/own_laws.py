@@ -80,7 +80,6 @@ def offered_shape(
     fitted = trial.fit.structure.values_of(law, trial.fit.all_values)
     forces = tuple(fitted[p.name] / along.size("force", shape.joint) for p in law.linear_parameters)
     missing, force = along.missing(trial.fit, shape.joint.name)
-    before, with_it = (bench.scored(own.support, own.fit).error_over_noise for own in (equation, trial))
     here = tuple(kind_of(e.name) for e in trial.fit.structure.effects if along.is_at(e, shape.joint))
     return OfferedShape(
         effect=replace(shape, forces=forces).effect,
@@ -89,7 +88,7 @@ def offered_shape(
         in_place_of=tuple(map(kind_of, shape.in_place_of)),
         n_knots=len(shape.sigmoids),
         share=shape.share,
-        error_before=before,
-        error_over_noise=with_it,
+        error_before=equation.error_over_noise,
+        error_over_noise=trial.error_over_noise,
         force=JointForce(missing, force, here),
     )

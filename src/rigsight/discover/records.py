@@ -71,13 +71,13 @@ def split(data: DiscoveryData) -> tuple[tuple[Record, ...], tuple[Record, ...], 
         return (
             rest,
             (middle,),
-            f"There is no validation record; '{middle.name}' was set aside and chose no term.",
+            f"There is no validation record; '{middle.name}' was set aside to select the terms.",
         )
     cut = int((1.0 - _HELD_BACK) * estimation[0].n_samples)
     return (
         (estimation[0].slice(0, cut),),
         (replace(estimation[0].slice(cut, None), name=f"{estimation[0].name} (end)"),),
-        "There is a single record; its last part was set aside and chose no term, but no other amplitude is tested.",
+        "There is a single record; its last part was set aside to select the terms, so no other amplitude is tested.",
     )
 
 

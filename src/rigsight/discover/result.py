@@ -76,7 +76,7 @@ class Alternative:
     terms: tuple[str, ...]  # names of the effects
     n_parameters: int  # number of fitted parameters
     held_out: float  # free-run error on the held-out records in units of the noise floor
-    # Information criteria of the error on the fitted records with its number of independent samples.
+    # Information criteria of that error with the number of independent samples.
     aic: float
     bic: float
 
@@ -208,9 +208,9 @@ class Discovery:
     terms
         Terms of the equation first, then those that were offered.
     alternatives
-        All supports that were polished, best first by the criterion of their fits.
+        All supports that were polished, best first.
     held_out
-        Error on each record that neither was fitted nor chose a term.
+        Error on each record by which supports were selected.
     held_out_error
         Free-run error on these records in units of the noise floor.
     held_out_nrmse, noise_floor

@@ -1,8 +1,8 @@
-"""Selection of terms: every support is fitted by output error and judged by what its free runs leave of the fitted records.
+"""Selection of terms: every support is fitted by output error and judged by free-run simulation of held-out records.
 
-Regression along the motion proposes terms; this module selects them. A term must improve the fit by more than the penalty of the
-Bayesian information criterion for its independent samples; of two indistinguishable models the one with fewer terms is kept.
-Held-out records choose nothing.
+Regression along the motion proposes terms; this module selects them. A term must improve the fit to the held-out records by more
+than the penalty of the Bayesian information criterion for their independent samples; of two indistinguishable models the one with
+fewer terms is kept.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ _ROUNDS = 4
 _BESIDE = 2
 """Equations that are extended beside the best, if terms act at several joints."""
 _NEAR = 1.5
-"""Factor of the smallest error up to which they are."""
+"""Factor of the smallest held-out error up to which they are."""
 _RELEASED = 0.98
-"""Factor by which a released special value (an exponent of 1) must lower the error to be kept."""
+"""Factor by which a released special value (an exponent of 1) must lower the held-out error to be kept."""
 
 _FEWEST = 10.0
 """Independent samples that are assumed at least."""
@@ -48,7 +48,7 @@ _WHITE = 0.75
 
 
 def independent_samples(trial: Trial) -> float:
-    """Return the number of independent samples that is equivalent to the colored errors of all outputs."""
+    """Return the number of independent samples that is equivalent to the colored held-out errors of all outputs."""
     return sum(map(_independent, trial.shown)) or _FEWEST
 
 
@@ -63,7 +63,7 @@ def _independent(residuals: Floats) -> float:
 
 
 def at_floor(trial: Trial) -> bool:
-    """Return True if an error is as small and as white as the noise: there is nothing left to explain."""
+    """Return True if a held-out error is as small and as white as the noise: there is nothing left to explain."""
     n = sum(errors.size for errors in trial.shown)
     if n == 0:
         return False
@@ -74,16 +74,17 @@ def at_floor(trial: Trial) -> bool:
 
 
 def _is_noise_of_inputs(bench: Bench, trial: Trial) -> bool:
-    """Return True if noise of the inputs can leave as much, but for chance, and noise of the sensors cannot."""
-    if not BY_NOISE < trial.error_over_noise < math.inf:
+    """Return True if noise of the inputs can leave the error of the fitted records, and noise of the sensors cannot."""
+    error = trial.fit.weighted_rms
+    if not BY_NOISE < error < math.inf:
         return False
     of_inputs = error_of_inputs(trial.fit, bench.estimation, bench.noise)
     by_chance = 1.0 + _CHANCE / math.sqrt(2.0 * independent_samples(trial))
-    return trial.error_over_noise <= by_chance * math.hypot(1.0, of_inputs)
+    return error <= by_chance * math.hypot(1.0, of_inputs)
 
 
 def criterion(trial: Trial, independent: float) -> float:
-    """Return the information criterion of the error of a fit."""
+    """Return the information criterion of a held-out error."""
     if not np.isfinite(trial.error_over_noise):
         return float("inf")
     return information_criterion(trial.error_over_noise**2, trial.n_free, independent)
@@ -95,13 +96,21 @@ class Selection:
 
     best: Trial  # the chosen support
     trials: tuple[Trial, ...]  # all polished supports, best first
-    independent: float  # number of independent samples of the errors
+    independent: float  # number of independent samples of the held-out errors
+
+    def otherwise(self, term: str) -> float:
+        """Return the held-out error, in noise floors, of the equation without a term of its own or with another one.
+
+        NaN where this equation was not tried.
+        """
+        changed = self.best.support ^ {term}
+        return next((t.error_over_noise for t in self.trials if t.support == changed), math.nan)
 
 
 def select(
     bench: Bench, linear: Trial, along: AlongMotion | None, progress: Callable[[str], None]
 ) -> Selection:
-    """Search for the support with the lowest criterion, from the equation without any term on.
+    """Search for the support with the lowest held-out criterion, from the equation without any term on.
 
     Where the sensors do not show the motion, every term is tried by a fit.
     """
@@ -261,7 +270,7 @@ def _independent_of(trials: Sequence[Trial]) -> float:
 
 
 def _fewest(bench: Bench, trials: Sequence[Trial]) -> Trial:
-    """Return the trial with the fewest parameters of those that the records do not distinguish from the best.
+    """Return the trial with the fewest parameters of those that the held-out records do not distinguish from the best.
 
     With equal numbers of parameters, fewer states are preferred, then what was offered first: a loop with one state to a series
     of sliders with six, a cubic spring to a pendulum.

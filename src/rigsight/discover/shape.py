@@ -1,8 +1,8 @@
 """Which function of one argument is missing at a joint, whatever its form? A sum of sigmoids along the measured motion.
 
 A sigmoid is a force that grows with the displacement or the velocity up to a knot, on both sides of rest or on one, and stays
-there. The records choose the knots: stepwise regression drops one after the other, and stretches that are not fitted judge what
-remains. Held-out records only show what the shape explains there.
+there. The records choose the knots: stepwise regression drops one after the other, and the motion of held-out records judges what
+remains.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from rigsight.inverse.effect_terms import EffectTerms
 from rigsight.inverse.equation_fit import per_force
 from rigsight.inverse.joint_force import joint_motion
 from rigsight.inverse.measured_motion import WIDER
-from rigsight.inverse.regression import STRETCHES, Regression
+from rigsight.inverse.regression import Regression
 from rigsight.inverse.selection import WORTH
 from rigsight.inverse.term import compiled
 from rigsight.parameters import Parameter
@@ -129,18 +129,6 @@ class _Rows:
         size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(np.float64).tiny)
         return np.asarray(np.linalg.lstsq(columns / size, self.missing, rcond=1e-12)[0] / size)
 
-    def misfit(self, chosen: Sequence[int]) -> float:
-        """Return the mean square that sigmoids leave of stretches, with numbers fitted to the others."""
-        squares = 0.0
-        for stretch in np.array_split(np.arange(self.missing.size), STRETCHES):
-            parts = (self.beside, self.sigmoids, self.missing)
-            fitted, left_out = (
-                _Rows(*(np.delete(own, stretch, axis=0) for own in parts)),
-                _Rows(*(own[stretch] for own in parts)),
-            )
-            squares += stretch.size * left_out.left(chosen, fitted.fitted(chosen))
-        return squares / self.missing.size
-
     def supports(self) -> list[tuple[int, ...]]:
         """Return the sigmoids that stepwise regression leaves of those on both sides, and of all, the fewest first."""
         q = np.linalg.qr(self.beside)[0]
@@ -157,26 +145,26 @@ class _Rows:
 def shapes(along: AlongMotion, fit: FitResult, held_out: Sequence[Record]) -> list[Shape]:
     """Return the laws of one argument at one joint, the best of each number of knots, the fewest first.
 
-    Joint, argument and the largest number are those that explain most of the missing force on stretches that are not fitted.
-    Nothing where no shape explains clearly more there than the laws of the equation, or held-out records do not show the motion.
+    Joint, argument and the largest number are those that explain most of the missing force along held-out records. Nothing where
+    these do not show the motion, or no shape explains clearly more there than the laws of the equation.
     """
     try:
         unseen = along.terms_of.along_records(held_out)
     except SimulationError:
         return []
     equation = _Equation.along_records(along, fit, (along.terms_of, unseen))
-    seen, _ = equation.rows((), along.rig.mechanism.joints[0], "velocity")
-    lowest, enough = equation.cost(seen, ()) - STRONG, (1.0 - WORTH) * seen.misfit(())
+    seen, held = equation.rows((), along.rig.mechanism.joints[0], "velocity")
+    lowest, enough = equation.cost(seen, held) - STRONG, (1.0 - WORTH) * held.left((), seen.fitted(()))
     found = list[Shape]()
     for joint, argument in itertools.product(along.rig.mechanism.joints, _SIGNALS):
         there = equation.laws_at(joint, argument)
         seen, held = equation.rows(there, joint, argument)
-        ordered = sorted((len(own), equation.cost(seen, own), own) for own in seen.supports())
-        supports, costs = [own for _, _, own in ordered], [cost for _, cost, _ in ordered]
+        supports = sorted(seen.supports(), key=lambda own: (len(own), equation.cost(seen, held, own)))
+        costs = [equation.cost(seen, held, own) for own in supports]
         if min(costs) < lowest:
             lowest = min(costs)
             lasting = [own for i, own in enumerate(supports) if costs[i] < min(costs[:i], default=math.inf)]
-            clear = [own for own in lasting if own and seen.misfit(own) < enough]
+            clear = [own for own in lasting if own and held.left(own, seen.fitted(own)) < enough]
             found = [equation.shape(joint, argument, there, own, seen, held) for own in clear]
     return found
 
@@ -228,10 +216,10 @@ class _Equation:
         n = matrix.shape[1] - 1 - len(laws)
         return _Rows(matrix[:, :n], matrix[:, n:-1], matrix[:, -1])
 
-    def cost(self, seen: _Rows, chosen: Sequence[int]) -> float:
-        """Return the information criterion of rows that are not fitted, of all fitted motions."""
-        n_numbers, independent = seen.beside.shape[1] + len(chosen), self.motions[0][1].n_rows / WIDER
-        return information_criterion(seen.misfit(chosen), n_numbers, independent)
+    def cost(self, seen: _Rows, held: _Rows, chosen: Sequence[int] = ()) -> float:
+        """Return the information criterion of the held-out rows, with numbers fitted to the others."""
+        n_numbers, independent = seen.beside.shape[1] + len(chosen), self.motions[1][1].n_rows / WIDER
+        return information_criterion(held.left(chosen, seen.fitted(chosen)), n_numbers, independent)
 
     def shape(
         self, joint: Joint, argument: str, there: tuple[str, ...], chosen: tuple[int, ...], seen: _Rows, held: _Rows
