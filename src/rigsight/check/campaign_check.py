@@ -45,9 +45,9 @@ _WEAK = 0.1
 _EVALUATIONS = 60
 """Of a rough fit: near enough for what the records determine, not for the numbers."""
 _OF_START = 15
-"""Of a rough fit that tells which start is nearer."""
+"""Of a rough fit that tells which start is nearer (a budget)."""
 _LARGER_PART = 0.5
-"""Share of a power, of a reading or of what another fit leaves."""
+"""Share of the power of a reading, or of what another fit leaves, that decides (a convention)."""
 _OF_MOTION = 0.99
 """Share of the power of the velocity below the end of the band of a motion."""
 _PER_PERIOD = 30.0
@@ -159,9 +159,9 @@ def _values(campaign: Campaign, short: Sequence[Record], noise: Mapping[str, flo
     """Return the numbers given, or those of a regression where rough fits of short records tell that they are nearer."""
     given = {**campaign.constants, **campaign.given}
     regressed = _regressed(campaign, given)
-    near, far = {**regressed, **given}, {**given, **regressed}
-    if near == far:
-        return near
+    as_given, as_regressed = {**regressed, **given}, {**given, **regressed}
+    if as_given == as_regressed:
+        return as_given
     structure = compose(campaign.rig, campaign.modelled)
     # Over pieces even a simulation with numbers that are far off stays in phase with the motion.
     pieces = cut(short, window_length(campaign.rig, short))
@@ -171,8 +171,9 @@ def _values(campaign: Campaign, short: Sequence[Record], noise: Mapping[str, flo
         free = _free(campaign)
         return fit.fit(start, free, max_evaluations=_OF_START, tolerance=1e-3, finish=False)
 
-    from_near, from_far = fitted(near), fitted(far)
-    return {**far, **from_far.values} if from_far.cost < _LARGER_PART * from_near.cost else near
+    from_given, from_regressed = fitted(as_given), fitted(as_regressed)
+    is_nearer = from_regressed.cost < _LARGER_PART * from_given.cost
+    return {**as_regressed, **from_regressed.values} if is_nearer else as_given
 
 
 def _regressed(campaign: Campaign, given: Mapping[str, float]) -> dict[str, float]:
@@ -254,7 +255,7 @@ def _parameters(
     factor = campaign.open_factor
     statement = " ".join(
         [
-            *_held_at(campaign, values, noise, windows, result.residuals),
+            *_judged_at(campaign, values, noise, windows, result.residuals),
             found.sentence,
             *([factor.sentence] if factor is not None and factor.is_given else []),
         ]
@@ -273,7 +274,7 @@ def _free(campaign: Campaign) -> list[str]:
     return [p.name for p in structure.parameters if p.name not in held]
 
 
-def _held_at(
+def _judged_at(
     campaign: Campaign,
     values: Mapping[str, float],
     noise: Mapping[str, float],

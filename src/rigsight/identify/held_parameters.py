@@ -34,6 +34,9 @@ _DRAWS = 3
 _SAME = 1e-9
 """Relative difference of rates that counts as rounding error."""
 _MASS = "[mass]"
+_MOST_TURNS = 1.0
+"""Range of an angle up to which a spring may be there although none was given (an assumption): wires and flat spirals that are
+wound further are rare, and their users give a stiffness."""
 _CLEARLY = 5.0
 """Standard errors from zero at which the stiffness is significant; large, because the residual is not white."""
 _LEAVES = 0.9
@@ -146,10 +149,10 @@ def weighed_spring(
         for s in rig.outputs
         if s.name in r and s.unit == "rad"
     ]
-    if max(turns, default=0.0) > 1.0:
+    if (most := max(turns, default=0.0)) > _MOST_TURNS:
         return (
             False,
-            f"{stiffness} = 0 is held in all fits: a shaft that turns by {max(turns):.3g} turns has no spring.",
+            f"{stiffness} = 0 is held in all fits: a shaft that turns by {most:.3g} turns has no spring.",
         )
     known = {**held, **{symbol.name: 0.0 for symbol in rig.motion.rest.free_symbols}}
     try:

@@ -169,7 +169,8 @@ def discovery_rows(found: Discovery) -> Iterator[tuple[str, str]]:
     if found.own_laws:
         yield "in no catalogue", found.laws_sentence
     for own in found.held_out:
-        yield f"{own.record}, held out", f"{gap_percent(own.nrmse)}, {own.error_over_noise:.3g} x floor"
+        error = f"{gap_percent(own.nrmse)}, {own.error_over_noise:.3g} x floor"
+        yield f"{own.record}, held out", f"{error}; not fitted, but it chose among the terms"
     for rival in found.alternatives[:_RANKED]:
         error = (
             f"{rival.held_out:.3g} x floor, BIC {rival.bic:.1f}"

@@ -20,18 +20,18 @@ Nanoseconds = NDArray[np.int64]
 
 _LONGEST, _MOST_UNDER_WAY = 0.1, 10
 """Fast messages travel shorter [s], on one machine as in a network, or no more of them are under way at a time: pictures that are
-evaluated come late, but not thousands of readings."""
+evaluated come late, but not thousands of readings (assumptions)."""
 _SYNCHRONIZED = 1e-4
-"""Clocks that differ by less [s] are one: what PTP, and the rounding of stamps, leave."""
+"""Clocks that differ by less [s] are one: what PTP, and the rounding of stamps, leave (an assumption)."""
 _FASTEST = 0.01
-"""Speeds of two real clocks differ by less; simulated time goes at any."""
+"""Speeds of two real clocks differ by less, of crystals by a hundredth of it; simulated time goes at any (an assumption)."""
 _STRETCHES, _FEWEST = 20, 5
-"""Stretches of a bag, each with an edge, and how many of them can show a drift."""
+"""Stretches of a bag, each with an edge, and how many of them can show a drift (conventions)."""
 _FEWEST_IN_STRETCH = 10
 _FAST = 0.05
-"""Share of messages that may be faster than the edge: some are stamped wrongly, or swapped."""
+"""Share of messages that may be faster than the edge: some are stamped wrongly, or swapped (a convention)."""
 _CLEAR = 3.0
-"""A drift moves the lower edge by so many times what it scatters about a line."""
+"""A drift moves the lower edge by so many times what it scatters about a line (a convention)."""
 _SECOND = 1_000_000_000
 _NO_DATE = 1e8
 """Seconds between clocks from which they count from different moments, not wrongly from the same."""
@@ -91,7 +91,8 @@ class _Clock:
         if abs(ahead) > _NO_DATE:
             where = "count from another moment than the times of reception"
         else:
-            where = f"are {abs(ahead):.3g} s {'ahead of' if ahead > 0.0 else 'behind'} the times of reception"
+            side = "ahead of" if ahead > 0.0 else "behind"
+            where = f"are {abs(ahead):.3g} s {side} the times of reception"
             if ahead < -_LONGEST:
                 where += " (longer than messages travel)"
         if not self.is_even:
@@ -150,8 +151,8 @@ def _onto(base: _Clock, own: _Clock | None, topic: Stamps, others_have_headers: 
         whose, how = "that of the recorder", f"they {own.describe()}"
     else:
         whose, how = f"those of '{base.topic}'", f"the latter {base.describe()}"
-    moved = "they were moved onto it, so that fast messages take no time"
-    notes.append(f"the headers of '{topic.topic}' are by another clock than {whose}: {how}; {moved}")
+    moved = "they were moved onto it, so that the fastest messages take no time"
+    notes.append(f"the headers of '{topic.topic}' are from another clock than {whose}: {how}; {moved}")
     return OnOneClock(base.shows(own.moment(stamped)), late / _SECOND, tuple(notes))
 
 
