@@ -284,7 +284,7 @@ def _judged_at(
     """Return sentences where parameters are judged at other numbers than those given, or at numbers that do not fit."""
     rig, given = campaign.rig, campaign.given
     others = [
-        f"{name} = {values[name]:.3g} instead of {given[name]:.3g}"
+        f"{name} = {values[name]:.4g} instead of {given[name]:.4g}"
         for name in sorted(rig.usually_positive & given.keys())
         if abs(values[name] - given[name]) > _WEAK * abs(given[name])
     ]
