@@ -263,6 +263,18 @@ def test_a_tone_that_a_controller_counters_is_a_tone() -> None:
     assert found.taken[0].values["w_p"] == pytest.approx(31.0, rel=5e-3)
 
 
+def test_a_tone_that_a_limit_cuts_off_is_a_tone() -> None:
+    """A drive that is limited to a square wave follows the motion as well, and takes the line of the tone."""
+    own, runs = campaign(AXIS, AXIS_VALUES, [], ()), []
+    for i in range(2):
+        square = Record("run", DT, {"u": 20.0 * np.sign(np.sin(12.0 * T + i))}, {}, hold="zoh")
+        run = simulate(compose(AXIS, []), AXIS_VALUES, square)
+        runs.append(run.with_signals(u=run["u"] + 14.0 * np.sin(31.0 * T + i)))
+    found = proposed(replace(own, records=tuple(runs)))
+    assert found.alone[0].effect.name == "periodic_disturbance"
+    assert found.taken[0].values["w_p"] == pytest.approx(31.0, rel=5e-3)
+
+
 @pytest.mark.parametrize("sharp", [None, 0.02])
 def test_a_family_is_proposed_in_its_plainest_form(sharp: float | None) -> None:
     """A sign that is rounded over a small speed is no other law of friction."""

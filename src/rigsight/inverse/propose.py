@@ -142,12 +142,15 @@ def selection_of(
     if not terms:
         return None
     selection = _with_finer_grid(Selection(fit, values, terms, noise), terms_of)
-    left = selection.regression.residuals(selection.columns_of(selection.selected(fit.rig)))
+    # A law that follows a tone takes its line from what is left beside it.
+    beside = [[], selection.columns_of(selection.selected(fit.rig))]
+    left = [selection.regression.residuals(columns) for columns in beside]
     tones = [
         term
         for e in effects
         if e.pulsation is not None
-        for term in of_tone(e, terms_of.fit, terms_of.values, left)
+        for rows in left
+        for term in of_tone(e, terms_of.fit, terms_of.values, rows)
     ]
     return selection.with_terms(tones)
 
