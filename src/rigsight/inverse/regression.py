@@ -183,7 +183,7 @@ class Regression:
 
     def residuals(self, chosen: Sequence[int]) -> list[Floats]:
         """Return what chosen columns leave along each motion, shape (n_equations, n_rows) each; zero where nothing moves."""
-        columns = [*self.own, *chosen]
+        columns = np.array([*self.own, *chosen], dtype=np.int64)
         left = self.matrix[:, -1] - self.matrix[:, columns] @ (self.solved(chosen) * self.size[columns])
         parts = np.split(left, np.cumsum([np.prod(shape) for shape in self.shapes])[:-1])
         return [part.reshape(shape) * self.unit for part, shape in zip(parts, self.shapes, strict=True)]
