@@ -17,10 +17,11 @@ from rigsight.campaign import Campaign
 from rigsight.effects import Effect, effect_named
 from rigsight.errors import InputError, SimulationError, check_option
 from rigsight.excitation import linear_sweep, log_sweep
-from rigsight.parameters import ParameterSet
+from rigsight.parameters import complete_values
 from rigsight.records import Hold, Record, Role
 from rigsight.records.signals import is_constant
-from rigsight.rigs import RIGS, Rig, read_rig_file, rig_of_tables, rotational
+from rigsight.rigs import RIGS, Rig, read_rig_file, rotational
+from rigsight.rigs.reading.rig_file import rig_of_tables
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.linearization import linearize
 from rigsight.simulate.model import Model
@@ -170,9 +171,7 @@ def make_model(
     """
     found = rig_of(rig)
     structure = compose(found, effects_on(found, effects_of(effects), found.name))
-    defaults = {p.name: p.default for p in structure.parameters if p.default is not None}
-    complete = ParameterSet.from_mapping(structure.parameters, {**defaults, **values})
-    return Model(structure, complete.to_mapping(), hold)
+    return Model(structure, complete_values(structure.parameters, values), hold)
 
 
 def rig_of(rig: str | Rig) -> Rig:
