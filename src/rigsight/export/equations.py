@@ -232,10 +232,7 @@ def _rest(structure: Structure, names: dict[str, str]) -> Rest | Balance | None:
 
 
 class _Names:
-    """Makes names that are words in every target and that occur once.
-
-    Outputs have their own, as most are the state of the same name.
-    """
+    """Makes names that are words in every target and that occur once; outputs have their own, as most are a state's name."""
 
     def __init__(self, reserved: Set[str]) -> None:
         self._reserved = reserved

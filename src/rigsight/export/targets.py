@@ -119,30 +119,8 @@ def export_model(
     step: float | None = None,
     source_only: bool = False,
 ) -> str | bytes:
-    """Return what a target writes for a model: text, or the bytes of an FMU.
-
-    Parameters
-    ----------
-    model
-        The model.
-    target
-        A key of `TARGETS`.
-    source
-        Where the model comes from, for the head of the text.
-    name
-        Name of the function, model or prefix.
-    hold
-        How the input behaves between samples, of a target that goes from sample to sample; default is the model's.
-    step
-        Longest internal step [s] of a target with a fixed one; default follows from the model's own time scales.
-    source_only
-        True for an FMU without a binary.
-
-    Raises
-    ------
-    InputError
-        If the target is unknown or has no words for an effect, hold or name, or if an FMU cannot be compiled.
-    """
+    """Return what a target writes for a model: text, or the bytes of an FMU, with a binary unless `source_only`."""
+    # The source stands in the head of the text. Hold and longest internal step [s] are by default those of the model.
     chosen = TARGETS[check_option("Target", target, TARGETS)]
     bodies = model.structure.rig.mechanism.bodies
     if bodies is not None:

@@ -183,13 +183,7 @@ class PlainRatio(FrequencyResponse):
     hold: Hold
 
     def free_motions(self, poles: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Return a basis of the free motions over the drive, shape (n_frequencies, n_poles).
-
-        Parameters
-        ----------
-        poles
-            Poles of the form [1/s], shape (n_poles,).
-        """
+        """Return a basis of the free motions with poles [1/s] over the drive, shape (n_frequencies, n_poles)."""
         return np.asarray(_free_motions(self.omega, self.dt, poles) / self.drive[:, None])
 
     def free_motion(self, weights: Floats, poles: NDArray[np.complex128]) -> Floats:
@@ -207,17 +201,7 @@ def _free_motions(omega: Floats, dt: float, poles: NDArray[np.complex128]) -> ND
 
 
 def plain_ratio(record: Record, local: FrequencyResponse, hold: Hold) -> PlainRatio:
-    """Return the plain ratio at the lines of a local model of the same record, with the noise that this found.
-
-    Parameters
-    ----------
-    record
-        The record.
-    local
-        Response of its source and response by a local model, whose `line_noise` is known.
-    hold
-        Hold of the source between its samples.
-    """
+    """Return the plain ratio at the lines of a local model of the same record, with the noise that this found."""
     assert local.line_noise is not None
     every = line_frequencies(record.n_samples, record.dt)
     lines = np.searchsorted(every, local.omega * (1.0 - 1e-9)) + 1

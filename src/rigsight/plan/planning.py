@@ -153,36 +153,9 @@ def plan_experiment(
     sizes: Sizes = "fitted",
     payloads: Sequence[Mapping[str, float]] = (),
 ) -> Plan:
-    """Return the experiment that separates rivals best.
-
-    Parameters
-    ----------
-    campaign
-        With the records so far.
-    named
-        At least two rivals.
-    limits
-        To be kept in the simulations of all rivals.
-    seconds
-        Duration of the experiment.
-    seed
-        Seed of drawn phases and noise.
-    say
-        Called with what has been done.
-    draws
-        Simulated outcomes for each rival as the truth.
-    sizes
-        Sizes of the rivals.
-    payloads
-        Values that constants of the rig may have in the experiment, beside those of the records.
-
-    Raises
-    ------
-    InputError
-        If the rig has no input, or no experiment keeps the limits.
-    SimulationError
-        If a rival cannot be simulated near the records.
-    """
+    """Return the experiment of so many seconds that separates rivals best within limits that hold in the simulations of all."""
+    # Payloads are values that constants of the rig may have in the experiment, beside those of the records; `draws` outcomes are
+    # simulated for each rival as the truth.
     rig, dt = campaign.rig, campaign.estimation[0].dt
     if not rig.inputs:
         raise InputError(f"{rig.name} has no input, so there is nothing to plan.")

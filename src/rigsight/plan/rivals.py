@@ -86,10 +86,8 @@ class Remainder:
         }
 
     def drawn(self, n_samples: int, rng: np.random.Generator) -> Floats:
-        """Return noise with the spectrum of the remainder and random phases, shape (n_samples, n_outputs).
-
-        J. Theiler et al., Physica D 58 (1992) 77.
-        """
+        """Return noise with the spectrum of the remainder and random phases, shape (n_samples, n_outputs)."""
+        # J. Theiler et al., Physica D 58 (1992) 77.
         spectrum = np.abs(np.fft.rfft(self.samples, axis=0))
         old, new = np.linspace(0.0, 1.0, spectrum.shape[0]), np.linspace(0.0, 1.0, n_samples // 2 + 1)
         lines = np.column_stack([np.interp(new, old, column) for column in spectrum.T])
@@ -157,13 +155,7 @@ def contest_of(
     say: Callable[[str], None],
     remainder: Remainder | None = None,
 ) -> Contest:
-    """Fit rivals to the estimation records of a campaign; `remainder` is what the best model leaves if these do not show it.
-
-    Raises
-    ------
-    SimulationError
-        If a rival cannot be simulated near the records.
-    """
+    """Fit rivals to the estimation records of a campaign; `remainder` is what the best model leaves if these do not show it."""
     context, windowing = prepared(campaign)
     alone = reidentify(context, context.start)
     fits = []

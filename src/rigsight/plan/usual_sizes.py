@@ -36,26 +36,9 @@ def truths_of_usual_size(
     records_count: bool,
     say: Callable[[str], None],
 ) -> list[Truth]:
-    """Return each rival as the truth with the size at which a search for it would start.
-
-    Parameters
-    ----------
-    campaign
-        Its records give the motion and the noise.
-    named
-        The rivals.
-    n_samples
-        Length of the record that is planned.
-    records_count
-        Whether the records are measured, so that they tell of the rivals as well; else the planned one is the first.
-    say
-        Called with what has been done.
-
-    Raises
-    ------
-    SimulationError
-        If a rival cannot be simulated.
-    """
+    """Return each rival as the truth with the size at which a search for it would start, for a record of `n_samples`."""
+    # The records give motion and noise. Where they count, as measured ones do, they tell of the rivals as well; else the planned
+    # one is the first.
     moving = liveliest(campaign.estimation, campaign.rig, OLD)
     context, windowing = prepared(replace(campaign, records=moving))
     base = reidentify(context, context.start).fit

@@ -3,7 +3,6 @@
 from rigsight.rigs.built_in import RIGS as RIGS
 from rigsight.rigs.built_in import KnownRigs as KnownRigs
 from rigsight.rigs.built_in import __getattr__ as __getattr__
-from rigsight.rigs.built_in import declared_rig as declared_rig
 from rigsight.rigs.built_in import rig_file_text as rig_file_text
 from rigsight.rigs.built_in import rotational as rotational
 from rigsight.rigs.controller import Controller as Controller
@@ -21,6 +20,5 @@ from rigsight.rigs.parts import applied_symbol as applied_symbol
 from rigsight.rigs.parts import force_symbol as force_symbol
 from rigsight.rigs.parts import reading_symbol as reading_symbol
 from rigsight.rigs.reading.rig_file import read_rig_file as read_rig_file
-from rigsight.rigs.reading.rig_file import rig_of_tables as rig_of_tables
 from rigsight.rigs.rig import Rig as Rig
 from rigsight.rigs.rig import joint_of as joint_of

@@ -70,10 +70,7 @@ class TreeBody:
 
 
 def bodies_of(model: mujoco.MjModel, *, only_scalar: bool = True) -> tuple[TreeBody, ...]:
-    """Return the bodies of a model behind their parents, without the world, with their hinges and slides.
-
-    `only_scalar` refuses other joints.
-    """
+    """Return the bodies of a model behind their parents, without the world; joints are hinges and slides if `only_scalar`."""
     import mujoco
 
     kinds = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}

@@ -13,7 +13,6 @@ from rigsight.simulate.equations.structure import unique_names as unique_names
 from rigsight.simulate.equilibrium import rest_state as rest_state
 from rigsight.simulate.side_by_side import Substeps as Substeps
 from rigsight.simulate.side_by_side import carries_tangents as carries_tangents
-from rigsight.simulate.side_by_side import choose_substeps as choose_substeps
 from rigsight.simulate.side_by_side import differs_at_events as differs_at_events
 from rigsight.simulate.side_by_side import has_dry_friction as has_dry_friction
 from rigsight.simulate.side_by_side import simulate_sets as simulate_sets

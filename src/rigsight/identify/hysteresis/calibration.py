@@ -299,11 +299,7 @@ def declared_starts(
 
 @dataclass(frozen=True, eq=False)
 class SearchBox:
-    """Maps the unit cube to search coordinates.
-
-    Ranges in characteristic units are spaced by their inverse hyperbolic sine: evenly up to a tenth of a unit, by decades
-    beyond.
-    """
+    """Maps the unit cube to search coordinates: evenly up to a tenth of a characteristic unit, by decades beyond (arsinh)."""
 
     # Range of each coordinate, shape (n_free,).
     lower: Floats

@@ -11,14 +11,13 @@ import numpy as np
 from rigsight.errors import InputError, check_option
 from rigsight.frequency import (
     FrequencyResponse,
-    PlainRatio,
     averaged_response,
     local_polynomial_response,
     local_rational_response,
-    plain_ratio,
     thesis_response,
 )
 from rigsight.frequency.signal_pair import excited, line_frequencies
+from rigsight.frequency.spectral import PlainRatio, plain_ratio
 from rigsight.identify.transfer.transfer_form import Order, TransferFit
 from rigsight.identify.transfer.transfer_function import MISFIT, fit_frequency_response
 from rigsight.records.record import Floats, Hold, Record
