@@ -32,10 +32,8 @@ from rigsight.identify import (
 )
 from rigsight.identify.fit.derivatives import orthonormal_basis
 from rigsight.identify.fit.fit_data import free_names
-from rigsight.records import Record
-from rigsight.records.record import Floats
-from rigsight.simulate import Structure
-from rigsight.simulate.model import Model
+from rigsight.records import Floats, Record
+from rigsight.simulate import Model, Structure
 
 _ROUNDED = 1e-7
 """Part of a column outside the initial states below which it depends on them."""

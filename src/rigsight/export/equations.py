@@ -12,7 +12,7 @@ from rigsight.effects import Place
 from rigsight.effects.symbols import clamp
 from rigsight.errors import InputError
 from rigsight.rigs import Rig
-from rigsight.simulate import parameter_vector
+from rigsight.simulate import Model, parameter_vector
 from rigsight.simulate.equations.binder import state_symbol
 from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.simulate.equations.derivatives import slope
@@ -20,7 +20,6 @@ from rigsight.simulate.equations.kinks import FrozenStructure, freeze
 from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
 from rigsight.simulate.equilibrium import has_raisable_damping, residuals_at_rest
 from rigsight.simulate.input_hold import Hold
-from rigsight.simulate.model import Model
 from rigsight.units import unit_text
 
 NO_START = "with friction or hysteresis the equilibrium is known only for zero inputs: begin with these, or give initial_state"

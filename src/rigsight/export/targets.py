@@ -26,11 +26,10 @@ from rigsight.export.modelica import modelica
 from rigsight.export.python_function import INPUT_WORDS as PYTHON_INPUTS
 from rigsight.export.python_function import WORDS as PYTHON
 from rigsight.export.python_function import python_function
-from rigsight.simulate import Structure, compose
+from rigsight.simulate import Model, Structure, compose
 from rigsight.simulate.equations.kinks import freeze
 from rigsight.simulate.equations.structure import input_symbols
 from rigsight.simulate.input_hold import Hold
-from rigsight.simulate.model import Model
 
 _FMUS: dict[str, Version] = {"fmu": 2, "fmu3": 3}
 STICKING = "the sticking of dry friction"

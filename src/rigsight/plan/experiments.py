@@ -16,8 +16,7 @@ from scipy.signal import sawtooth
 
 from rigsight.errors import InputError, nearest
 from rigsight.excitation import log_sweep, multisine, multisine_lines
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 from rigsight.rigs import Rig
 
 SHARES = (1.0, 0.3, 0.1)

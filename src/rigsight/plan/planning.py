@@ -15,8 +15,7 @@ from rigsight.plan.experiments import Bench, Limit, with_recorded_range
 from rigsight.plan.rivals import Named, Truth, contest_of
 from rigsight.plan.search import Scored, Search, posterior, predicted, refitted
 from rigsight.plan.usual_sizes import truths_of_usual_size
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 
 SCHEMA_VERSION = 1
 Sizes = Literal["fitted", "usual", "usual, no records"]

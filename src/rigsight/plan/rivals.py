@@ -18,8 +18,7 @@ from rigsight.errors import SimulationError
 from rigsight.identify import FitResult, GreyBoxFit, IdleThreads
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.windows import Windowing, liveliest
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 
 OLD = 8000
 """Samples of the most excited stretches of all records together that rivals are fitted to again and again. Fewer than there are

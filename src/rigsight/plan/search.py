@@ -21,8 +21,7 @@ from rigsight.identify.fit.fit_data import FitData
 from rigsight.identify.fit.settled_states import guessed_states
 from rigsight.plan.experiments import SHARES, Bench, Experiment, Limit, use_of
 from rigsight.plan.rivals import Contest, Rival, Truth
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 from rigsight.simulate import simulate
 
 _ACCURACY = 1e-4

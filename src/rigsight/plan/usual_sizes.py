@@ -21,8 +21,7 @@ from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.windows import Windowing, liveliest
 from rigsight.inverse import LAW_ERROR
 from rigsight.plan.rivals import OLD, REACH, Contest, Named, Remainder, Rival, Truth, contest_of, prepared
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 from rigsight.simulate import record_values, simulate
 
 _OF_SENSORS = 1e-3

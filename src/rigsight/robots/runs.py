@@ -11,15 +11,13 @@ import numpy as np
 
 from rigsight.errors import InputError
 from rigsight.metrics import nrmse
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.rigs.reading.rig_file import rig_of_tables
 from rigsight.robots.draft import RigDraft, with_known_constants
 from rigsight.robots.tree import lock
 from rigsight.robots.writing_back import WrittenModel, write_back
-from rigsight.simulate import compose, simulate
-from rigsight.simulate.model import Model
+from rigsight.simulate import Model, compose, simulate
 
 if TYPE_CHECKING:
     import mujoco

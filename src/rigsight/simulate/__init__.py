@@ -11,6 +11,7 @@ from rigsight.simulate.equations.structure import carried_over as carried_over
 from rigsight.simulate.equations.structure import special_values as special_values
 from rigsight.simulate.equations.structure import unique_names as unique_names
 from rigsight.simulate.equilibrium import rest_state as rest_state
+from rigsight.simulate.model import Model as Model
 from rigsight.simulate.side_by_side import Substeps as Substeps
 from rigsight.simulate.side_by_side import carries_tangents as carries_tangents
 from rigsight.simulate.side_by_side import differs_at_events as differs_at_events

@@ -22,9 +22,8 @@ from rigsight.records import Hold, Record, Role
 from rigsight.records.signals import is_constant
 from rigsight.rigs import RIGS, Rig, read_rig_file, rotational
 from rigsight.rigs.reading.rig_file import rig_of_tables
-from rigsight.simulate import compose, simulate
+from rigsight.simulate import Model, compose, simulate
 from rigsight.simulate.linearization import linearize
-from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.campaign_file import Offsets, Where, checked_numbers, checked_simulation
 from rigsight.workflow.campaign.read_campaign import campaign_of_records, check_roles, read_campaign
 from rigsight.workflow.campaign.record_notes import in_units_of, rig_in_units_of

@@ -16,8 +16,7 @@ from rigsight.identify.joint import JointFit, fit_jointly
 from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
 from rigsight.identify.transfer.transfer_function import MISFIT
 from rigsight.metrics import nrmse
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 from rigsight.records.signals import roughness
 from rigsight.report.labels import gap_percent, sentence_case
 from rigsight.simulate import Structure
