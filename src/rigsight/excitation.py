@@ -296,11 +296,9 @@ def _elapsed(t: Floats) -> tuple[Floats, float]:
     return tau, float(tau[-1])
 
 
-def _check_frequencies(
-    t: Floats, omega_start: float, omega_stop: float, lowest: float, names: tuple[str, str] = ("start", "end")
-) -> None:
+def _check_frequencies(t: Floats, omega_start: float, omega_stop: float, lowest: float) -> None:
     nyquist = math.pi * (t.size - 1) / float(t[-1] - t[0])
-    for what, omega in zip(names, (omega_start, omega_stop), strict=True):
+    for what, omega in (("start", omega_start), ("end", omega_stop)):
         if not lowest <= omega <= nyquist:
             least = "at least 0" if lowest == 0.0 else "above 0"
             raise InputError(

@@ -3,8 +3,6 @@
 from rigsight.check.campaign_check import Check as Check
 from rigsight.check.channels import Channel as Channel
 from rigsight.check.channels import CheckedRecord as CheckedRecord
-from rigsight.check.effect_matrix import EffectMatrix as EffectMatrix
-from rigsight.check.effect_matrix import Holes as Holes
 from rigsight.check.effect_matrix import Told as Told
 from rigsight.check.effect_matrix import Visible as Visible
 from rigsight.check.effect_matrix import holes_of as holes_of

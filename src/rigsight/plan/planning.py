@@ -55,46 +55,21 @@ class Trials:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """An experiment to be played.
+    """An experiment to be played."""
 
-    Attributes
-    ----------
-    title, rig
-        Of the campaign.
-    sizes
-        Whether the rivals were fitted to the records or are of a usual size.
-    what
-        The experiment in words.
-    record
-        Its inputs, with the constants of the rig that it needs.
-    limits
-        With the largest value in the simulations of all rivals.
-    rivals
-        Most probable first.
-    errors
-        Error to be expected of each output.
-    now
-        Expected probability of the truth before.
-    without_noise
-        Expected probability of the truth afterwards for the numbers so far and readings without noise.
-    trials
-        The simulated outcomes.
-    others
-        Further experiments with their linearized worth.
-    """
-
+    # Of the campaign.
     title: str
     rig: str
-    sizes: Sizes
-    what: str
-    record: Record
-    limits: tuple[tuple[Limit, float], ...]
-    rivals: tuple[Prediction, ...]
-    errors: Mapping[str, float]
-    now: float
-    without_noise: float
-    trials: Trials
-    others: tuple[Scored, ...]
+    sizes: Sizes  # whether the rivals were fitted to the records or are of a usual size
+    what: str  # the experiment in words
+    record: Record  # its inputs, with the constants of the rig that it needs
+    limits: tuple[tuple[Limit, float], ...]  # with the largest value in the simulations of all rivals
+    rivals: tuple[Prediction, ...]  # most probable first
+    errors: Mapping[str, float]  # error to be expected of each output
+    now: float  # expected probability of the truth before
+    without_noise: float  # the same afterwards for the numbers so far and readings without noise
+    trials: Trials  # the simulated outcomes
+    others: tuple[Scored, ...]  # further experiments with their linearized worth
 
     @property
     def promised(self) -> float:
