@@ -248,12 +248,8 @@ def log_sweep(t: Floats, amplitude: float, omega_start: float, omega_stop: float
 
     Parameters
     ----------
-    t
-        Equally spaced times [s], shape (n_samples,); the sweep begins at the first and ends at the last.
-    amplitude
-        Amplitude, in the unit of the input.
-    omega_start, omega_stop
-        Angular frequency at the first and the last sample [rad/s], both above zero.
+    t, amplitude, omega_start, omega_stop
+        As of `linear_sweep`, with angular frequencies above zero.
 
     Raises
     ------

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigsight.errors import InputError, nearest
+from rigsight.errors import InputError, nearest, needing
 from rigsight.records.formats.known import file_size
 from rigsight.records.record import Floats
 
@@ -153,12 +153,8 @@ def load_spec(path: Path) -> mujoco.MjSpec:
 
     Where a mesh is missing, shapes are left out of bodies that have an inertia of their own: only what moves is taken over.
     """
-    try:
+    with needing("Reading MJCF and URDF", "MuJoCo", "mujoco"):
         import mujoco
-    except ImportError:
-        raise InputError(
-            "Reading MJCF and URDF needs MuJoCo, which is not installed: pip install 'rigsight[mujoco]'."
-        ) from None
     if file_size(path, "the model file") > LARGEST_FILE:
         raise InputError(f"{path}: is larger than {LARGEST_FILE / 1e6:g} MB, the limit for a model file.")
     try:

@@ -176,12 +176,12 @@ class _Local:
         return _smaller_variance(found, alone, np.maximum(spread, 0.0)), plain, fit
 
     def _estimated(self, record: Record, transient: bool, instrument: str | None) -> FrequencyResponse:
-        local = local_rational_response if self.method == "local_rational" else local_polynomial_response
         lines, *_ = self.resolved(instrument)
-        return local(
+        return local_polynomial_response(
             record,
             self.source,
             self.name,
+            poles=2 if self.method == "local_rational" else 0,
             bandwidth=self.resolution or lines * _line(record),
             transient=transient,
             hold=self.hold,
