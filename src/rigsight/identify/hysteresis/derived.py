@@ -68,14 +68,10 @@ def derived_quantities(
     amplitudes: Sequence[float],
     scales: Mapping[str, float],
     rng: np.random.Generator,
-    n_draws: int = _DRAWS,
 ) -> DerivedQuantities:
-    """Derive pairs, saturation, and loop areas at some deflections (such as `record_amplitudes`) from a fit with its covariance.
-
-    The scales are those of the fit; the parameters are drawn `n_draws` times.
-    """
+    """Derive pairs, saturation, and loop areas at some deflections, as of `record_amplitudes`, from a fit with its covariance."""
     structure = fit.structure
-    draws = parameter_draws(fit, scales, rng, n_draws)
+    draws = parameter_draws(fit, scales, rng, _DRAWS)
     determined = _determined(fit)
     known = dict(structure.fixed)
 
