@@ -10,8 +10,7 @@ from typing import Any, Self
 from rigsight.records import ColumnMapping, Hold, Kind, Record, Role
 from rigsight.records import read_record as read_file
 from rigsight.rigs import Rig as DeclaredRig
-from rigsight.rigs import read_rig_file, rotational
-from rigsight.rigs.reading.rig_file import rig_of_tables
+from rigsight.rigs import read_rig_file, rig_of_tables, rotational
 from rigsight.workflow.campaign.campaign_file import Where, checked_numbers
 from rigsight.workflow.campaign.in_memory import rig_of
 from rigsight.workflow.campaign.read_campaign import options_of

@@ -26,8 +26,7 @@ from rigsight.identify.information import POORLY_KNOWN, information, listed
 from rigsight.identify.linear_view import longest_free_run, near_rest
 from rigsight.inverse import numbers_along_motion, with_all_inputs
 from rigsight.json_data import json_data
-from rigsight.records import Floats, Record
-from rigsight.records.signals import is_constant
+from rigsight.records import Floats, Record, is_constant
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.simulate.linearization import Linearization

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import csd
 
-from rigsight.records import Floats, Record
-from rigsight.records.signals import is_constant
+from rigsight.records import Floats, Record, is_constant
 from rigsight.rigs import Rig
 
 _SEGMENTS = 16

@@ -14,8 +14,7 @@ from rigsight.errors import SimulationError
 from rigsight.inverse.effect_terms import EffectTerms
 from rigsight.inverse.propose import along_motion
 from rigsight.inverse.separability import Pushes
-from rigsight.records import Record
-from rigsight.records.signals import is_constant
+from rigsight.records import Record, is_constant
 from rigsight.simulate import compose, record_values, simulate
 
 Told = Literal["apart", "by size", "other motion", "alike"]

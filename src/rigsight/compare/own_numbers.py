@@ -28,10 +28,10 @@ from rigsight.identify import (
     RecordDerivatives,
     characteristic_scales,
     derivatives,
+    free_names,
     spectral_product,
 )
 from rigsight.identify.fit.derivatives import orthonormal_basis
-from rigsight.identify.fit.fit_data import free_names
 from rigsight.records import Floats, Record
 from rigsight.simulate import Model, Structure
 

@@ -12,9 +12,8 @@ from rigsight.effects import Place
 from rigsight.effects.symbols import clamp
 from rigsight.errors import InputError
 from rigsight.rigs import Rig
-from rigsight.simulate import Model, parameter_vector
+from rigsight.simulate import Model, parameter_vector, without_vanished_effects
 from rigsight.simulate.equations.binder import state_symbol
-from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.simulate.equations.derivatives import slope
 from rigsight.simulate.equations.kinks import FrozenStructure, freeze
 from rigsight.simulate.equations.structure import TIME, Structure, input_symbols

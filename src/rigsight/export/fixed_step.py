@@ -14,8 +14,7 @@ from rigsight.export.description import hold_text
 from rigsight.export.equations import Exported
 from rigsight.records.record import Floats
 from rigsight.rigs import evaluated
-from rigsight.simulate import Model, parameter_vector, rest_state
-from rigsight.simulate.equations.composition import without_vanished_effects
+from rigsight.simulate import Model, parameter_vector, rest_state, without_vanished_effects
 from rigsight.simulate.equations.kinks import FrozenStructure, freeze
 from rigsight.simulate.equations.straight_line import straight_line
 from rigsight.simulate.equations.structure import TIME, Structure, input_rates, input_symbols

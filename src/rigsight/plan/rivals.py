@@ -15,8 +15,7 @@ from rigsight.diagnose.search.horizon import restores, windowing_of
 from rigsight.diagnose.search.single_effects import fit_candidate, reidentify
 from rigsight.effects import Effect
 from rigsight.errors import SimulationError
-from rigsight.identify import FitResult, GreyBoxFit, IdleThreads
-from rigsight.identify.fit.coordinates import Coordinates
+from rigsight.identify import Coordinates, FitResult, GreyBoxFit, IdleThreads
 from rigsight.identify.fit.windows import Windowing, liveliest
 from rigsight.records import Floats, Record
 

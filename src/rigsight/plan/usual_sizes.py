@@ -16,8 +16,7 @@ from rigsight.campaign import Campaign
 from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.diagnose.search.starts import start_values
-from rigsight.identify import FitResult
-from rigsight.identify.fit.coordinates import Coordinates
+from rigsight.identify import Coordinates, FitResult
 from rigsight.identify.fit.windows import Windowing, liveliest
 from rigsight.inverse import LAW_ERROR
 from rigsight.plan.rivals import OLD, REACH, Contest, Named, Remainder, Rival, Truth, contest_of, prepared

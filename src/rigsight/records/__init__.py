@@ -8,3 +8,4 @@ from rigsight.records.record import Hold as Hold
 from rigsight.records.record import Kind as Kind
 from rigsight.records.record import Record as Record
 from rigsight.records.record import Role as Role
+from rigsight.records.signals import is_constant as is_constant

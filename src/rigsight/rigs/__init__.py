@@ -20,5 +20,6 @@ from rigsight.rigs.parts import applied_symbol as applied_symbol
 from rigsight.rigs.parts import force_symbol as force_symbol
 from rigsight.rigs.parts import reading_symbol as reading_symbol
 from rigsight.rigs.reading.rig_file import read_rig_file as read_rig_file
+from rigsight.rigs.reading.rig_file import rig_of_tables as rig_of_tables
 from rigsight.rigs.rig import Rig as Rig
 from rigsight.rigs.rig import joint_of as joint_of

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from rigsight.errors import InputError, needing
-from rigsight.rigs import Rig
-from rigsight.rigs.reading.rig_file import rig_of_tables
+from rigsight.rigs import Rig, rig_of_tables
 from rigsight.robots.energies import Energies, energies_of
 from rigsight.robots.free_joints import (
     FreeJoint,

@@ -12,8 +12,7 @@ import numpy as np
 from rigsight.errors import InputError
 from rigsight.metrics import nrmse
 from rigsight.records import Floats, Record
-from rigsight.rigs import Rig
-from rigsight.rigs.reading.rig_file import rig_of_tables
+from rigsight.rigs import Rig, rig_of_tables
 from rigsight.robots.draft import RigDraft, with_known_constants
 from rigsight.robots.tree import lock
 from rigsight.robots.writing_back import WrittenModel, write_back

@@ -6,6 +6,7 @@ from rigsight.simulate.compiled.kernel import kernel_of as kernel_of
 from rigsight.simulate.equations.composition import compose as compose
 from rigsight.simulate.equations.composition import structure_named as structure_named
 from rigsight.simulate.equations.composition import structure_of_fit as structure_of_fit
+from rigsight.simulate.equations.composition import without_vanished_effects as without_vanished_effects
 from rigsight.simulate.equations.structure import Structure as Structure
 from rigsight.simulate.equations.structure import carried_over as carried_over
 from rigsight.simulate.equations.structure import special_values as special_values

@@ -24,8 +24,8 @@ from rigsight.simulate import (
     record_values,
     rest_state,
     simulate,
+    without_vanished_effects,
 )
-from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.workflow.campaign.campaign_file import Where, checked_numbers
 from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
 from rigsight.workflow.campaign.read_campaign import options_of

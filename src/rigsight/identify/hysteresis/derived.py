@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import sympy as sp
 
+from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
-from rigsight.effects.effect import Effect
 from rigsight.errors import InputError
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.covariance import symmetric_eigen

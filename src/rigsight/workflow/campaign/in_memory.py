@@ -18,10 +18,8 @@ from rigsight.effects import Effect, effect_named
 from rigsight.errors import InputError, SimulationError, check_option
 from rigsight.excitation import linear_sweep, log_sweep
 from rigsight.parameters import complete_values
-from rigsight.records import Hold, Record, Role
-from rigsight.records.signals import is_constant
-from rigsight.rigs import RIGS, Rig, read_rig_file, rotational
-from rigsight.rigs.reading.rig_file import rig_of_tables
+from rigsight.records import Hold, Record, Role, is_constant
+from rigsight.rigs import RIGS, Rig, read_rig_file, rig_of_tables, rotational
 from rigsight.simulate import Model, compose, simulate
 from rigsight.simulate.linearization import linearize
 from rigsight.workflow.campaign.campaign_file import Offsets, Where, checked_numbers, checked_simulation

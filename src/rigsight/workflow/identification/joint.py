@@ -8,12 +8,11 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from rigsight.campaign import Campaign
-from rigsight.identify import GreyBoxFit, characteristic_scales, estimate_conicity
+from rigsight.identify import GreyBoxFit, PhysicalEstimates, characteristic_scales, estimate_conicity
 from rigsight.identify.amplitude_dependence import measured_amplitude
 from rigsight.identify.fit.windows import cut
 from rigsight.identify.identification import JointIdentification, RecordIdentification, RecordScore
 from rigsight.identify.joint import JointFit, fit_jointly
-from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
 from rigsight.identify.transfer.transfer_function import MISFIT
 from rigsight.metrics import nrmse
 from rigsight.records import Floats, Record

@@ -11,8 +11,7 @@ from functools import cache
 from typing import Any
 
 from rigsight.effects import Effect
-from rigsight.rigs import AXIS, ELEMENT, RUNNING_GEAR, Rig
-from rigsight.rigs.reading.rig_file import rig_of_tables
+from rigsight.rigs import AXIS, ELEMENT, RUNNING_GEAR, Rig, rig_of_tables
 
 RESONANCE = 10.0
 """Angular frequency of the axis of the sine tests [rad/s]."""
