@@ -85,7 +85,6 @@ def speed() -> dict[str, dict[str, float]]:
     from rigsight.records.record import Record
     from rigsight.rigs import RUNNING_GEAR
     from rigsight.simulate import (
-        choose_substeps,
         compose,
         parameter_vector,
         record_input,
@@ -93,6 +92,7 @@ def speed() -> dict[str, dict[str, float]]:
         simulate_outputs,
         simulate_sets,
     )
+    from rigsight.simulate.side_by_side import choose_substeps
 
     t = DT * np.arange(N_SAMPLES)
     scale = t[-1] / np.log(640.0 / 1e-3)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
-from rigsight.export import export_model
+from rigsight.export.targets import export_model
 from rigsight.libraries.library_cache import c_compilers
 from rigsight.records import Record
 from rigsight.rigs import RUNNING_GEAR

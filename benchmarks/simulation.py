@@ -25,7 +25,6 @@ from rigsight.records.record import Record
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import (
-    choose_substeps,
     compose,
     parameter_vector,
     record_input,
@@ -33,6 +32,7 @@ from rigsight.simulate import (
     simulate_outputs,
     simulate_sets,
 )
+from rigsight.simulate.side_by_side import choose_substeps
 
 Floats = NDArray[np.float64]
 

@@ -26,7 +26,8 @@ from rigsight.effects import Effect, effect_named
 from rigsight.errors import RigsightError
 from rigsight.excitation import linear_sweep, multisine, multisine_lines, step
 from rigsight.identify import characteristic_scales
-from rigsight.plan import Limit, Named, plan_experiment
+from rigsight.plan import Limit, Named
+from rigsight.plan.planning import plan_experiment
 from rigsight.plan.rivals import Contest, contest_of
 from rigsight.records import Record
 from rigsight.rigs import AXIS

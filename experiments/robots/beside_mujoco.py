@@ -11,7 +11,8 @@ import mujoco
 import numpy as np
 
 from rigsight.records import Record
-from rigsight.robots import draft_rig, free_run, load_model, write_back
+from rigsight.robots import free_run, load_model, write_back
+from rigsight.robots.draft import draft_rig
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.model import Model
 

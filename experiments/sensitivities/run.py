@@ -27,15 +27,11 @@ from rigsight.libraries.library_cache import c_compilers, library
 from rigsight.records import Record
 from rigsight.records.record import Hold
 from rigsight.rigs import RUNNING_GEAR
-from rigsight.simulate import (
-    FittedRecord,
-    choose_substeps,
-    compose,
-    record_input,
-)
+from rigsight.simulate import FittedRecord, compose, record_input
 from rigsight.simulate.compiled import kernel
 from rigsight.simulate.compiled.kernel import Kernel
 from rigsight.simulate.compiled.kernel_source import KernelEquations, kernel_source
+from rigsight.simulate.side_by_side import choose_substeps
 from rigsight.units import characteristic_value
 from rigsight.workflow.own import effect_checks
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from operator import attrgetter
 
 import numpy as np
 from fit_tables import BAND
@@ -28,7 +29,7 @@ from virtual_rig import (
 from rigsight.effects import effect_named
 from rigsight.excitation import step
 from rigsight.frequency import FrequencyResponse
-from rigsight.identify import JointFit, characteristic_scales, fit_jointly
+from rigsight.identify import JointFit, characteristic_scales
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.identify.hysteresis import (
     SpectralRatio,
@@ -36,6 +37,7 @@ from rigsight.identify.hysteresis import (
     fitted_break_frequency,
     peak,
 )
+from rigsight.identify.joint import fit_jointly
 from rigsight.records import Record
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.simulate import Structure, compose
@@ -151,7 +153,7 @@ def joint_fit() -> JointFit:
     # In free run, y inherits the error of psi: fitted to y as well, c_y would make up for what the yaw equation lacks.
     records = [replace(r, signals={name: r[name] for name in ("u", "psi")}) for r in estimation_records()]
     lateral = {name: value for name, value in lateral_values().items() if name != "psi_off"}
-    return fit_jointly(compose(RUNNING_GEAR), records, CONSTANTS, known=lateral)
+    return fit_jointly(compose(RUNNING_GEAR), records, CONSTANTS, lateral, {}, group_of=attrgetter("kind"))
 
 
 def joint_linear() -> Model:

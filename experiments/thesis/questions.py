@@ -152,7 +152,8 @@ def sweeps_and_steps() -> Table:
         f"{name} {value:.4g}" for name, value in fitted_to_both()[1].items() if name not in CONSTANTS
     )
     table.caption = (
-        f"Linear. {joint.statement} Together: {both}; {alone}.\nFitted hysteretic set: {hysteretic}"
+        f"Linear. Together: {both}; {alone} (by chance with probability {joint.probability:.1g}).\n"
+        f"Fitted hysteretic set: {hysteretic}"
     )
     return table
 

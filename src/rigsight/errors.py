@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 from typing import Any
 
@@ -77,3 +78,14 @@ def check_in_range(what: str, value: Any, lower: float, upper: float, unit: str 
         suffix = f" {unit}" if unit else ""
         raise InputError(f"{what} must lie in [{lower:g}, {upper:g}]{suffix}, got {number:g}.")
     return number
+
+
+@contextmanager
+def needing(what: str, package: str, extra: str) -> Iterator[None]:
+    """Turn the failed import of an optional package into a message on the extra that installs it."""
+    try:
+        yield
+    except ImportError:
+        raise InputError(
+            f"{what} needs {package}, which is not installed: pip install 'rigsight[{extra}]'."
+        ) from None

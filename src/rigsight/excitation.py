@@ -248,12 +248,8 @@ def log_sweep(t: Floats, amplitude: float, omega_start: float, omega_stop: float
 
     Parameters
     ----------
-    t
-        Equally spaced times [s], shape (n_samples,); the sweep begins at the first and ends at the last.
-    amplitude
-        Amplitude, in the unit of the input.
-    omega_start, omega_stop
-        Angular frequency at the first and the last sample [rad/s], both above zero.
+    t, amplitude, omega_start, omega_stop
+        As of `linear_sweep`, with angular frequencies above zero.
 
     Raises
     ------
@@ -296,11 +292,9 @@ def _elapsed(t: Floats) -> tuple[Floats, float]:
     return tau, float(tau[-1])
 
 
-def _check_frequencies(
-    t: Floats, omega_start: float, omega_stop: float, lowest: float, names: tuple[str, str] = ("start", "end")
-) -> None:
+def _check_frequencies(t: Floats, omega_start: float, omega_stop: float, lowest: float) -> None:
     nyquist = math.pi * (t.size - 1) / float(t[-1] - t[0])
-    for what, omega in zip(names, (omega_start, omega_stop), strict=True):
+    for what, omega in (("start", omega_start), ("end", omega_stop)):
         if not lowest <= omega <= nyquist:
             least = "at least 0" if lowest == 0.0 else "above 0"
             raise InputError(

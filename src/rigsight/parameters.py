@@ -1,9 +1,9 @@
-"""A physical parameter (name, unit, bounds, null value) and sets of their values."""
+"""A physical parameter (name, unit, bounds, null value), and complete values of several."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from rigsight.errors import InputError, check_in_range, nearest
@@ -60,42 +60,14 @@ class Parameter:
         return check_in_range(f"Parameter '{self.name}'", value, self.lower, self.upper, self.unit)
 
 
-@dataclass(frozen=True)
-class ParameterSet:
-    """An ordered set of parameters with their values, convertible to a vector and back."""
-
-    parameters: tuple[Parameter, ...]
-    values: tuple[float, ...]
-
-    @classmethod
-    def from_mapping(cls, parameters: Iterable[Parameter], values: Mapping[str, float]) -> ParameterSet:
-        """Order `values` as `parameters` are."""
-        parameters = tuple(parameters)
-        names = [parameter.name for parameter in parameters]
-        missing = [name for name in names if name not in values]
-        unknown = [name for name in values if name not in names]
-        if unknown:
-            hint = nearest(unknown[0], names)
-            raise InputError(f"Unknown parameters: {', '.join(unknown)}.{hint} Known: {', '.join(names)}.")
-        if missing:
-            raise InputError(f"Missing parameters: {', '.join(missing)}.")
-        return cls(parameters, tuple(p.check(values[p.name]) for p in parameters))
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Parameter names in order."""
-        return tuple(parameter.name for parameter in self.parameters)
-
-    def to_mapping(self) -> dict[str, float]:
-        """Return name -> value."""
-        return dict(zip(self.names, self.values, strict=True))
-
-    def replace(self, **values: float) -> ParameterSet:
-        """Return a copy with some values changed."""
-        return ParameterSet.from_mapping(self.parameters, {**self.to_mapping(), **values})
-
-    def __getitem__(self, name: str) -> float:
-        return self.values[self.names.index(name)]
-
-    def __iter__(self) -> Iterator[tuple[Parameter, float]]:
-        return iter(zip(self.parameters, self.values, strict=True))
+def complete_values(parameters: Iterable[Parameter], values: Mapping[str, float]) -> dict[str, float]:
+    """Return checked values in the order of the parameters, with defaults of those that are not given."""
+    known = {parameter.name: parameter for parameter in parameters}
+    unknown = [name for name in values if name not in known]
+    if unknown:
+        hint = nearest(unknown[0], known)
+        raise InputError(f"Unknown parameters: {', '.join(unknown)}.{hint} Known: {', '.join(known)}.")
+    complete = {name: values.get(name, parameter.default) for name, parameter in known.items()}
+    if missing := [name for name, value in complete.items() if value is None]:
+        raise InputError(f"Missing parameters: {', '.join(missing)}.")
+    return {name: known[name].check(value) for name, value in complete.items() if value is not None}

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.check import Check, check_campaign
+from rigsight.check import Check
+from rigsight.check.campaign_check import check_campaign
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.identify import OFFSETS_MEND
 from rigsight.records import Record

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from rigsight.check import EffectMatrix, Told, Visible, holes_of
+from rigsight.check import Told, Visible, holes_of
+from rigsight.check.effect_matrix import EffectMatrix
 from rigsight.effects import Family
 
 FAMILIES = (

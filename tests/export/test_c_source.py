@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigsight.export import export_model
+from rigsight.export.targets import export_model
 from rigsight.libraries.library_cache import c_compilers, kernel_options
 from rigsight.simulate.compiled.kernel_equations import KernelEquations
 from rigsight.simulate.compiled.kernel_source import accurate_integrator

@@ -6,7 +6,7 @@ import control
 import numpy as np
 import pytest
 
-from rigsight.export import export_model
+from rigsight.export.targets import export_model
 
 SMOOTH, KINKED = 1e-6, 1e-4
 """A solver that knows no events crosses kinks with the error of its step."""

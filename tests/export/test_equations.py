@@ -10,9 +10,9 @@ import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
 from rigsight.effects.symbols import v, x
-from rigsight.export import TARGETS, export_model
+from rigsight.export import TARGETS
 from rigsight.export.equations import exported
-from rigsight.export.targets import RESERVED
+from rigsight.export.targets import RESERVED, export_model
 from rigsight.libraries.templates import template
 from rigsight.parameters import Parameter
 from rigsight.rigs import AXIS

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rigsight.errors import InputError
-from rigsight.export import export_model
+from rigsight.export.targets import export_model
 from rigsight.libraries.library_cache import c_compilers, kernel_options
 
 from ..tiers import slow_but

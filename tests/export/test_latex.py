@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rigsight.export import export_model
+from rigsight.export.targets import export_model
 
 
 def text_of(case) -> str:

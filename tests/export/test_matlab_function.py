@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigsight.export import export_model
+from rigsight.export.targets import export_model
 
 pytestmark = [
     pytest.mark.skipif(

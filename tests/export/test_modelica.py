@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from rigsight.export import export_model
+from rigsight.export.targets import export_model
 from rigsight.records import Record
 from rigsight.simulate import simulate
 

@@ -18,8 +18,9 @@ import pytest
 from numpy.typing import NDArray
 
 from rigsight.effects import effect_named, placed
-from rigsight.export import TARGETS, export_model
+from rigsight.export import TARGETS
 from rigsight.export.python_function import WORDS
+from rigsight.export.targets import export_model
 from rigsight.libraries.library_cache import c_compilers
 from rigsight.records import Record
 from rigsight.rigs import Rig, read_rig_file

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigsight.export import export_model
+from rigsight.export.targets import export_model
 from rigsight.records import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import compose, rest_state

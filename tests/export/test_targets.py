@@ -9,8 +9,15 @@ import sympy as sp
 
 from rigsight.effects import CATALOGUE, Effect, Energy, GainTrend, Place, Signature, effect_named, symbols
 from rigsight.errors import InputError
-from rigsight.export import TARGETS, export_model
-from rigsight.export.targets import DELAY, FELT_ACCELERATION, SENSOR_DELAY, STICKING, STICKING_TOGETHER
+from rigsight.export import TARGETS
+from rigsight.export.targets import (
+    DELAY,
+    FELT_ACCELERATION,
+    SENSOR_DELAY,
+    STICKING,
+    STICKING_TOGETHER,
+    export_model,
+)
 from rigsight.parameters import Parameter
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose

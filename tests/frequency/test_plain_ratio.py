@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from rigsight.frequency import PlainRatio, local_rational_response, plain_ratio
+from rigsight.frequency import local_rational_response
+from rigsight.frequency.spectral import PlainRatio, plain_ratio
 from rigsight.records import Record
 
 DT, POLES = 0.01, np.array([-2.0 + 9.0j, -2.0 - 9.0j])

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.check import check_campaign
+from rigsight.check.campaign_check import check_campaign
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
-from rigsight.plan import Named, Plan, plan_experiment, read_limits, read_payloads
-from rigsight.plan.experiments import use_of
+from rigsight.plan import Named
+from rigsight.plan.experiments import read_limits, read_payloads, use_of
+from rigsight.plan.planning import Plan, plan_experiment
 from rigsight.plan.rivals import contest_of
 from rigsight.plan.search import about, posterior, refitted
 from rigsight.plan.usual_sizes import truths_of_usual_size

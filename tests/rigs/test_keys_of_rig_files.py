@@ -11,8 +11,8 @@ import pytest
 from pydantic import BaseModel
 
 from rigsight.errors import InputError
-from rigsight.rigs import rig_of_tables
 from rigsight.rigs.reading.declaration import RigTable, SimulatorTable
+from rigsight.rigs.reading.rig_file import rig_of_tables
 from rigsight.simulators import Bodies
 
 Tables = dict[str, Any]

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from rigsight.errors import InputError
-from rigsight.robots import RigDraft, draft_rig, load_model, rig_text
+from rigsight.robots import RigDraft, load_model, rig_text
+from rigsight.robots.draft import draft_rig
 
 MODELS = Path(__file__).parent / "models"
 

@@ -11,8 +11,9 @@ import pytest
 from rigsight.errors import InputError
 from rigsight.identify.rig_equations import equations_of
 from rigsight.records import Record
-from rigsight.rigs import rig_of_tables
-from rigsight.robots import RobotFile, free_run, gap_of_written, read_robot, write_back
+from rigsight.rigs.reading.rig_file import rig_of_tables
+from rigsight.robots import RobotFile, free_run, read_robot, write_back
+from rigsight.robots.runs import gap_of_written
 from rigsight.simulate import compose, parameter_vector, simulate
 from rigsight.simulate.model import Model
 

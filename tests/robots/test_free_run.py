@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from rigsight.robots import draft_rig, free_run, load_model, load_spec, with_gears
+from rigsight.robots import free_run, load_model, load_spec, with_gears
+from rigsight.robots.draft import draft_rig
 from rigsight.robots.runs import ALLOWED
 
 from ..tiers import slow_but

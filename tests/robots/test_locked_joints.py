@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from rigsight.records import Record
-from rigsight.robots import draft_rig, free_run, gap_of_written, load_model, write_back
-from rigsight.robots.runs import ALLOWED
+from rigsight.robots import free_run, load_model, write_back
+from rigsight.robots.draft import draft_rig
+from rigsight.robots.runs import ALLOWED, gap_of_written
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.model import Model
 

@@ -12,7 +12,8 @@ from pxr import Sdf, Usd, UsdGeom, UsdPhysics
 
 from rigsight.effects import effect_named, placed
 from rigsight.errors import InputError
-from rigsight.robots import draft_rig, load_model, usd_layer
+from rigsight.robots import load_model, usd_layer
+from rigsight.robots.draft import draft_rig
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
 

@@ -16,7 +16,9 @@ from rigsight.effects import effect_named, placed
 from rigsight.errors import InputError
 from rigsight.records import Record
 from rigsight.rigs import RIGS
-from rigsight.robots import draft_rig, gap_of_written, isaac_settings, load_model, sensor_readings, write_back
+from rigsight.robots import isaac_settings, load_model, sensor_readings, write_back
+from rigsight.robots.draft import draft_rig
+from rigsight.robots.runs import gap_of_written
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.model import Model
 

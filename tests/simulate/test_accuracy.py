@@ -14,7 +14,6 @@ from rigsight.excitation import log_sweep
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RUNNING_GEAR
 from rigsight.simulate import (
-    choose_substeps,
     compose,
     parameter_vector,
     record_input,
@@ -22,7 +21,8 @@ from rigsight.simulate import (
     simulate,
     simulate_outputs,
     simulate_sets,
-)  # fmt: skip
+)
+from rigsight.simulate.side_by_side import choose_substeps  # fmt: skip
 
 SETS = ("R", "B", "P", "stiff")
 DT = 5e-3

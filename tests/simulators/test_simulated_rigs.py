@@ -14,8 +14,8 @@ from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.identify.rig_equations import equations_of
 from rigsight.records import Record
-from rigsight.rigs import read_rig_file, rig_of_tables
-from rigsight.rigs.reading.rig_file import rig_of_text
+from rigsight.rigs import read_rig_file
+from rigsight.rigs.reading.rig_file import rig_of_tables, rig_of_text
 from rigsight.simulate import compose, parameter_vector, record_input, simulate, simulate_sets
 from rigsight.simulate.side_by_side import simulate_tangents
 from rigsight.simulators import give_function

@@ -26,9 +26,7 @@ from rigsight.identify.information import POORLY_KNOWN, information, listed
 from rigsight.identify.linear_view import longest_free_run, near_rest
 from rigsight.inverse import numbers_along_motion, with_all_inputs
 from rigsight.json_data import json_data
-from rigsight.records import Record
-from rigsight.records.record import Floats
-from rigsight.records.signals import is_constant
+from rigsight.records import Floats, Record, is_constant
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.simulate.linearization import Linearization
@@ -119,17 +117,7 @@ class Check:
 
 
 def check_campaign(campaign: Campaign, effects: Sequence[Effect], say: Callable[[str], None]) -> Check:
-    """Return what the records of a campaign can show.
-
-    Parameters
-    ----------
-    campaign
-        Read and checked.
-    effects
-        Candidates at their places.
-    say
-        Called with each of `PARTS` that is done.
-    """
+    """Return what the records of a campaign can show; each of `PARTS` that is done is said."""
     rig = campaign.rig
     records = tuple(checked_record(rig, record) for record in campaign.records)
     say(PARTS[0])
@@ -229,10 +217,7 @@ def _parameters(
     noise: Mapping[str, float],
     linear: Linearization | None,
 ) -> tuple[tuple[CheckedParameter, ...], str, tuple[Sequence[Record], Sequence[Floats]]]:
-    """Return the parameters with the statement on those that are not determined, and what a rough fit leaves of its windows.
-
-    There are none where the start cannot be simulated.
-    """
+    """Return the parameters, what is not determined, and what a rough fit leaves; none where the start cannot be simulated."""
     rig, structure = campaign.rig, compose(campaign.rig, campaign.modelled)
     limit = None if linear is None else longest_free_run(linear.poles, records)
     if limit is not None or campaign.drifts:

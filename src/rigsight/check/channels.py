@@ -14,9 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import csd
 
-from rigsight.records import Record
-from rigsight.records.record import Floats
-from rigsight.records.signals import is_constant
+from rigsight.records import Floats, Record, is_constant
 from rigsight.rigs import Rig
 
 _SEGMENTS = 16
@@ -114,10 +112,8 @@ def _channel(name: str, unit: str, is_input: bool, samples: Floats, octaves: tup
 
 
 def _white_noise(samples: Floats) -> float:
-    """Return the standard deviation of the white noise at the top of the spectrum; zero where a signal reaches up there.
-
-    The powers of lines of noise scatter, those of a sweep or a step do not. A signal that mostly stands still is a command.
-    """
+    """Return the standard deviation of the white noise at the top of the spectrum; zero where a signal reaches up there."""
+    # The powers of lines of noise scatter, those of a sweep or a step do not. A signal that mostly stands still is a command.
     if np.mean(np.diff(samples) == 0.0) > _HELD:
         return 0.0
     window = np.hanning(samples.size)

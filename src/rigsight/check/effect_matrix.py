@@ -14,8 +14,7 @@ from rigsight.errors import SimulationError
 from rigsight.inverse.effect_terms import EffectTerms
 from rigsight.inverse.propose import along_motion
 from rigsight.inverse.separability import Pushes
-from rigsight.records import Record
-from rigsight.records.signals import is_constant
+from rigsight.records import Record, is_constant
 from rigsight.simulate import compose, record_values, simulate
 
 Told = Literal["apart", "by size", "other motion", "alike"]
@@ -33,35 +32,19 @@ _OPEN: Sequence[Told] = ("other motion", "by size", "alike")
 
 @dataclass(frozen=True)
 class EffectMatrix:
-    """Pairs of effects, in the order of the catalogue.
+    """Pairs of effects, in the order of the catalogue."""
 
-    Attributes
-    ----------
-    effects, families, where
-        Name, family and place of each effect.
-    visible
-        Whether each effect shows beside the parameters in these records.
-    told
-        Whether the effects of a row and a column can be told apart.
-    motions
-        Of pairs that another motion tells apart, the first motion that does.
-    not_judged
-        Names of the effects that only fits of the simulation find.
-    hidden
-        Names of the effects that these records cannot show at any size.
-    reason
-        Why there is no matrix; empty where there is one.
-    """
-
+    # Name, family and place of each effect.
     effects: tuple[str, ...] = ()
     families: tuple[Family, ...] = ()
     where: tuple[str, ...] = ()
-    visible: tuple[Visible, ...] = ()
-    told: tuple[tuple[Told, ...], ...] = ()
+    visible: tuple[Visible, ...] = ()  # whether each effect shows beside the parameters in these records
+    told: tuple[tuple[Told, ...], ...] = ()  # whether the effects of a row and a column can be told apart
+    # Of pairs that another motion tells apart, the first motion that does.
     motions: Mapping[tuple[int, int], str] = field(default_factory=dict)
-    not_judged: tuple[str, ...] = ()
-    hidden: tuple[str, ...] = ()
-    reason: str = ""
+    not_judged: tuple[str, ...] = ()  # names of the effects that only fits of the simulation find
+    hidden: tuple[str, ...] = ()  # names of the effects that these records cannot show at any size
+    reason: str = ""  # why there is no matrix; empty where there is one
 
     @property
     def pairs(self) -> list[tuple[int, int]]:
@@ -167,21 +150,12 @@ def _other_motions(
 
 @dataclass(frozen=True)
 class Holes:
-    """Effects of different families or places that records leave open together.
+    """Effects of different families or places that records leave open together."""
 
-    Attributes
-    ----------
-    effects
-        Their names, the one with the most open pairs first; empty where nothing is open.
-    hidden
-        Whether one of them does not show beside the parameters at some or all sizes, so that no effect is their rival, too.
-    others
-        Names of further effects that are open.
-    """
-
-    effects: tuple[str, ...]
+    effects: tuple[str, ...]  # names, the one with the most open pairs first; empty where nothing is open
+    # Whether one of them does not show beside the parameters at some or all sizes, so that no effect is their rival, too.
     hidden: bool
-    others: tuple[str, ...]
+    others: tuple[str, ...]  # names of further effects that are open
 
 
 def holes_of(matrix: EffectMatrix, most: int) -> Holes:

@@ -18,8 +18,7 @@ from rigsight.diagnose.noise.detection import NoiseFloor
 from rigsight.identify import OFFSETS_MEND, differing_means
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.start.linear_start import moves_against
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 from rigsight.records.signals import instrument_of, is_constant, moves_beyond_noise
 from rigsight.rigs import Rig, evaluated
 from rigsight.simulate import compose

@@ -20,7 +20,7 @@ from rigsight.errors import InputError
 if TYPE_CHECKING:
     from rich.console import Group
 
-    from rigsight.plan import Plan
+    from rigsight.plan.planning import Plan
     from rigsight.workflow.power import Power
     from rigsight.workflow.reproduce import Reproduction
 

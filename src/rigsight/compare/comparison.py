@@ -17,8 +17,7 @@ from rigsight.frequency import FrequencyResponse
 from rigsight.identify.transfer.record_response import Method
 from rigsight.json_data import json_data
 from rigsight.metrics import rms
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 from rigsight.simulate.model import Model
 
 Quantity = Literal["magnitude_rmse", "phase_rmse", "magnitude_db", "step_rmse", "free_run_nrmse"]

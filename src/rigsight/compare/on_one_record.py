@@ -28,11 +28,9 @@ from rigsight.frequency import FrequencyResponse
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.identify.transfer.record_response import Method
 from rigsight.metrics import nrmse
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 from rigsight.rigs import Rig
-from rigsight.simulate import simulate
-from rigsight.simulate.model import Model
+from rigsight.simulate import Model, simulate
 
 _TOLERANCE, _EVALUATIONS = 1e-5, 60
 """Relative change of the squared error at which states are good enough, and limit: hysteresis that does not forget needs many."""

@@ -28,14 +28,12 @@ from rigsight.identify import (
     RecordDerivatives,
     characteristic_scales,
     derivatives,
+    free_names,
     spectral_product,
 )
 from rigsight.identify.fit.derivatives import orthonormal_basis
-from rigsight.identify.fit.fit_data import free_names
-from rigsight.records import Record
-from rigsight.records.record import Floats
-from rigsight.simulate import Structure
-from rigsight.simulate.model import Model
+from rigsight.records import Floats, Record
+from rigsight.simulate import Model, Structure
 
 _ROUNDED = 1e-7
 """Part of a column outside the initial states below which it depends on them."""

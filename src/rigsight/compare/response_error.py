@@ -23,8 +23,7 @@ from rigsight.frequency.signal_pair import among
 from rigsight.identify.transfer.record_response import Method, driven_band, record_response
 from rigsight.identify.transfer.transfer_form import Order
 from rigsight.metrics import rms
-from rigsight.records import Record
-from rigsight.records.record import Floats, Hold
+from rigsight.records import Floats, Hold, Record
 from rigsight.records.signals import is_constant, moves_beyond_noise, roughness
 from rigsight.rigs import Rig
 

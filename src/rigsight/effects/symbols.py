@@ -72,11 +72,10 @@ time_size = sp.Symbol("time_size", positive=True)
 
 
 class positive_part(sp.Function):  # type: ignore[misc]  # noqa: N801
-    """max(expression, 0).
+    """max(expression, 0)."""
 
-    A function of its own, because (e + Abs(e))/2 cancels: below a threshold it leaves rounding noise instead of zero, and
-    above a huge one nothing of a small signal.
-    """
+    # A function of its own, because (e + Abs(e))/2 cancels: below a threshold it leaves rounding noise instead of zero, and
+    # above a huge one nothing of a small signal.
 
     is_real = True
 
@@ -124,10 +123,8 @@ def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
 
 
 def _slope(expression: sp.Expr, symbol: sp.Symbol, known: dict[sp.Expr, sp.Expr]) -> sp.Expr:
-    """Return the derivative of an expression, with those that are `known` of its parts.
-
-    `sympy.diff` differentiates a part anew wherever it occurs; of an arm, whose joints carry one another, that is many times.
-    """
+    """Return the derivative of an expression, with those that are `known` of its parts."""
+    # `sympy.diff` differentiates a part anew wherever it occurs; of an arm, whose joints carry one another, that is many times.
     if expression in known:
         return known[expression]
     parts, rule = expression.args, getattr(type(expression), "_eval_derivative", None)
@@ -170,17 +167,8 @@ def clamp(expression: sp.Expr, half_width: sp.Expr) -> sp.Expr:
 
 
 def sigmoid(signal: sp.Expr, knot: sp.Expr | float, side: int = 0) -> sp.Expr:
-    """Return a smooth function of `signal` that grows by one up to a knot and stays there; zero at zero.
-
-    Parameters
-    ----------
-    signal
-        For instance `x` or `v`.
-    knot
-        Where the growth ends, positive.
-    side
-        0: on both sides of zero, with the sign of the signal; 1 or -1: mainly where the signal has this sign.
-    """
+    """Return a smooth function of `signal` that grows by one up to a positive knot and stays there; zero at zero."""
+    # Side 0: on both sides of zero, with the sign of the signal; 1 or -1: mainly where the signal has this sign.
     width = _LEVELS_OFF * knot
 
     def distance(place: sp.Expr | float) -> sp.Expr:

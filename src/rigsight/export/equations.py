@@ -12,15 +12,13 @@ from rigsight.effects import Place
 from rigsight.effects.symbols import clamp
 from rigsight.errors import InputError
 from rigsight.rigs import Rig
-from rigsight.simulate import parameter_vector
+from rigsight.simulate import Model, parameter_vector, without_vanished_effects
 from rigsight.simulate.equations.binder import state_symbol
-from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.simulate.equations.derivatives import slope
 from rigsight.simulate.equations.kinks import FrozenStructure, freeze
 from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
 from rigsight.simulate.equilibrium import has_raisable_damping, residuals_at_rest
 from rigsight.simulate.input_hold import Hold
-from rigsight.simulate.model import Model
 from rigsight.units import unit_text
 
 NO_START = "with friction or hysteresis the equilibrium is known only for zero inputs: begin with these, or give initial_state"
@@ -232,10 +230,7 @@ def _rest(structure: Structure, names: dict[str, str]) -> Rest | Balance | None:
 
 
 class _Names:
-    """Makes names that are words in every target and that occur once.
-
-    Outputs have their own, as most are the state of the same name.
-    """
+    """Makes names that are words in every target and that occur once; outputs have their own, as most are a state's name."""
 
     def __init__(self, reserved: Set[str]) -> None:
         self._reserved = reserved

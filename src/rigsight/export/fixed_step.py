@@ -14,13 +14,11 @@ from rigsight.export.description import hold_text
 from rigsight.export.equations import Exported
 from rigsight.records.record import Floats
 from rigsight.rigs import evaluated
-from rigsight.simulate import parameter_vector, rest_state
-from rigsight.simulate.equations.composition import without_vanished_effects
+from rigsight.simulate import Model, parameter_vector, rest_state, without_vanished_effects
 from rigsight.simulate.equations.kinks import FrozenStructure, freeze
 from rigsight.simulate.equations.straight_line import straight_line
 from rigsight.simulate.equations.structure import TIME, Structure, input_rates, input_symbols
 from rigsight.simulate.input_hold import HeldInput, hold_input, together
-from rigsight.simulate.model import Model
 
 OSCILLATION = 0.03
 """Step times the angular frequency of the fastest oscillation: Runge-Kutta then errs by less than 1e-6 over its decay."""

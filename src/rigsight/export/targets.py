@@ -26,11 +26,10 @@ from rigsight.export.modelica import modelica
 from rigsight.export.python_function import INPUT_WORDS as PYTHON_INPUTS
 from rigsight.export.python_function import WORDS as PYTHON
 from rigsight.export.python_function import python_function
-from rigsight.simulate import Structure, compose
+from rigsight.simulate import Model, Structure, compose
 from rigsight.simulate.equations.kinks import freeze
 from rigsight.simulate.equations.structure import input_symbols
 from rigsight.simulate.input_hold import Hold
-from rigsight.simulate.model import Model
 
 _FMUS: dict[str, Version] = {"fmu": 2, "fmu3": 3}
 STICKING = "the sticking of dry friction"
@@ -119,30 +118,8 @@ def export_model(
     step: float | None = None,
     source_only: bool = False,
 ) -> str | bytes:
-    """Return what a target writes for a model: text, or the bytes of an FMU.
-
-    Parameters
-    ----------
-    model
-        The model.
-    target
-        A key of `TARGETS`.
-    source
-        Where the model comes from, for the head of the text.
-    name
-        Name of the function, model or prefix.
-    hold
-        How the input behaves between samples, of a target that goes from sample to sample; default is the model's.
-    step
-        Longest internal step [s] of a target with a fixed one; default follows from the model's own time scales.
-    source_only
-        True for an FMU without a binary.
-
-    Raises
-    ------
-    InputError
-        If the target is unknown or has no words for an effect, hold or name, or if an FMU cannot be compiled.
-    """
+    """Return what a target writes for a model: text, or the bytes of an FMU, with a binary unless `source_only`."""
+    # The source stands in the head of the text. Hold and longest internal step [s] are by default those of the model.
     chosen = TARGETS[check_option("Target", target, TARGETS)]
     bodies = model.structure.rig.mechanism.bodies
     if bodies is not None:

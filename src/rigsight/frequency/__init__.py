@@ -6,7 +6,5 @@ from rigsight.frequency.local_model import local_rational_response as local_rati
 from rigsight.frequency.several_inputs import ResponsesOfInputs as ResponsesOfInputs
 from rigsight.frequency.several_inputs import responses_of_inputs as responses_of_inputs
 from rigsight.frequency.signal_pair import hold_response as hold_response
-from rigsight.frequency.spectral import PlainRatio as PlainRatio
 from rigsight.frequency.spectral import averaged_response as averaged_response
-from rigsight.frequency.spectral import plain_ratio as plain_ratio
 from rigsight.frequency.spectral import thesis_response as thesis_response

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,12 +44,27 @@ _RESPONDS = 10.0
 by chance one line in 500 reaches it."""
 
 
+@dataclass(frozen=True)
+class _LocalModel:
+    """Lines on each side of the center, degrees of polynomials and denominator, and whether a transient is modeled."""
+
+    half: int
+    order: int
+    poles: int
+    transient: bool
+
+    @property
+    def width(self) -> int:
+        return 2 * self.half + 1
+
+
 def local_polynomial_response(
     record: Record,
     source: str,
     response: str,
     *,
     order: int = 2,
+    poles: int = 0,
     bandwidth: float | None = None,
     transient: bool = True,
     hold: Hold = "band_limited",
@@ -68,6 +84,8 @@ def local_polynomial_response(
         Names of the signals.
     order
         Degree of the polynomials.
+    poles
+        Degree of a common denominator, as of `local_rational_response`.
     bandwidth
         Width of the band around each line [rad/s]; None takes the narrowest that leaves six degrees of freedom. Wider
         bands lower the variance and raise the bias.
@@ -103,84 +121,6 @@ def local_polynomial_response(
     be distinguished there and the variance is large. Some seconds of rest before the sweep avoid this. With rest after it as
     well, ``transient=False`` is better still; without rest it is biased, and its variance does not show the bias.
     """
-    return _local_response(
-        record, source, response, order, 0, bandwidth, transient, hold, band, wanted, instrument
-    )
-
-
-def local_rational_response(
-    record: Record,
-    source: str,
-    response: str,
-    *,
-    order: int = 2,
-    bandwidth: float | None = None,
-    transient: bool = True,
-    hold: Hold = "band_limited",
-    band: tuple[float, float] | None = None,
-    wanted: Floats | None = None,
-    instrument: str | None = None,
-) -> FrequencyResponse:
-    """Return the frequency response with a rational function of the frequency fitted around each line.
-
-    ``A(r) Y(k + r) = B(r) U(k + r) + T(r)`` with polynomials of degree `order` and ``A(0) = 1``: a resonance narrower than
-    the band is followed, where a polynomial cuts its peak.
-
-    Parameters
-    ----------
-    record, source, response, order, bandwidth, transient, hold, band, wanted, instrument
-        As of `local_polynomial_response`.
-
-    Returns
-    -------
-    FrequencyResponse
-        At every line of the record's spectrum in the band.
-
-    Raises
-    ------
-    InputError
-        If the record is too short for `bandwidth`, or does not excite the band, or the source is not correlated with the
-        instrument.
-
-    Notes
-    -----
-    The response is on both sides of the equation, so large noise biases the estimate: below a signal-to-noise ratio of about
-    30 dB the variance is 10 to 30 % too small, and below 20 dB the local polynomial is better. The note in
-    `local_polynomial_response` on the beginning of a sweep applies here too; where the beginning and the transient cannot be
-    distinguished, the variance may be several times too small.
-    """
-    return _local_response(
-        record, source, response, order, order, bandwidth, transient, hold, band, wanted, instrument
-    )
-
-
-@dataclass(frozen=True)
-class _LocalModel:
-    """Lines on each side of the center, degrees of polynomials and denominator, and whether a transient is modeled."""
-
-    half: int
-    order: int
-    poles: int
-    transient: bool
-
-    @property
-    def width(self) -> int:
-        return 2 * self.half + 1
-
-
-def _local_response(
-    record: Record,
-    source: str,
-    response: str,
-    order: int,
-    poles: int,
-    bandwidth: float | None,
-    transient: bool,
-    hold: Hold,
-    band: tuple[float, float] | None,
-    wanted: Floats | None,
-    instrument: str | None,
-) -> FrequencyResponse:
     method = "local rational" if poles else "local polynomial"
     if order < 0:
         raise InputError(f"The order of a local model must be 0 or more, got {order}.")
@@ -252,6 +192,16 @@ def _local_response(
         bias=bias,
         noise_freedom=float(width - unknowns),
     ).at(kept)
+
+
+local_rational_response = partial(local_polynomial_response, poles=2)
+"""The frequency response with a rational function of the frequency fitted around each line; see `local_polynomial_response`.
+
+``A(r) Y(k + r) = B(r) U(k + r) + T(r)`` with ``A(0) = 1``: a resonance narrower than the band is followed, where a polynomial
+cuts its peak. The response is on both sides of the equation, so large noise biases the estimate: below a signal-to-noise ratio
+of about 30 dB the variance is 10 to 30 % too small, and below 20 dB the local polynomial is better. Where the beginning of a
+sweep and the transient cannot be distinguished, the variance may be several times too small.
+"""
 
 
 class LocalFit:

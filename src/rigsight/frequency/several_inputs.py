@@ -43,6 +43,8 @@ _FEWEST = 8
 _ONE_TONE = 0.9
 """Share of an input's power within one local band, from which it is a tone: a tone between two lines leaves 3 % outside of it."""
 _STILL = 1e-12
+_ORDER = 2
+"""Degree of the polynomials in a local band."""
 _CHUNK = 128
 
 
@@ -74,9 +76,9 @@ class _Spectra:
     def line(self) -> float:
         return float(self.omega[0])
 
-    def width(self, order: int, poles: int, resolution: float | None) -> int:
+    def width(self, poles: int, resolution: float | None) -> int:
         """Return the number of lines of a local band: its unknowns and some more, or the resolution if that is wider."""
-        unknowns = (order + 1) * (int(np.count_nonzero(self.moves)) + self.has_transient) + poles
+        unknowns = (_ORDER + 1) * (int(np.count_nonzero(self.moves)) + self.has_transient) + poles
         wished = 0 if resolution is None else round(resolution / self.line)
         return max(unknowns + SPARE, wished) | 1
 
@@ -86,7 +88,6 @@ def responses_of_inputs(
     sources: Sequence[str],
     responses: Sequence[str],
     *,
-    order: int = 2,
     poles: int = 2,
     resolution: float | None = None,
     smooth: Sequence[str] = (),
@@ -100,8 +101,6 @@ def responses_of_inputs(
         out. If the inputs are periodic, whole periods are averaged, without the first.
     sources, responses
         Names of the signals.
-    order
-        Degree of the polynomials in a local band.
     poles
         Degree of the common denominator; 0 for a local polynomial model.
     resolution
@@ -126,9 +125,9 @@ def responses_of_inputs(
     ]
     for response in responses:
         own = _long_enough(
-            [s for s in spectra if response in s.record and s.width(order, poles, resolution) <= s.omega.size]
+            [s for s in spectra if response in s.record and s.width(poles, resolution) <= s.omega.size]
         )
-        local = _LocalModels(own, response, order, poles, resolution) if own else None
+        local = _LocalModels(own, response, poles, resolution) if own else None
         for index, source in enumerate(sources):
             if local is None or not any(s.moves[index] for s in own):
                 problems[source, response] = _unmoved(source, response, records)
@@ -214,13 +213,11 @@ class _LocalModels:
         self,
         spectra: Sequence[_Spectra],
         response: str,
-        order: int,
         poles: int,
         resolution: float | None,
     ) -> None:
-        self._spectra, self._response = spectra, response
-        self._order, self._poles = order, poles
-        self._widths = [s.width(order, poles, resolution) for s in spectra]
+        self._spectra, self._response, self._poles = spectra, response, poles
+        self._widths = [s.width(poles, resolution) for s in spectra]
         self._moving = np.flatnonzero(np.any([s.moves for s in spectra], axis=0))
         self._lines = [np.fft.rfft(s.record[response])[1 : s.omega.size + 1] * s.scale for s in spectra]
         self._omega = _frequencies(spectra)
@@ -251,7 +248,7 @@ class _LocalModels:
         if np.count_nonzero(kept) < _FEWEST:
             return None, ()
         names = tuple(s.record.name for s in self._spectra)
-        kind = f"local {'rational' if self._poles else 'polynomial'}, order {self._order}"
+        kind = f"local {'rational' if self._poles else 'polynomial'}, order {_ORDER}"
         return FrequencyResponse(
             omega=self._omega[kept],
             values=values[kept],
@@ -286,7 +283,7 @@ class _LocalModels:
         """Return values and variances of all inputs, degrees of freedom, and the share of each that others do not explain."""
         # Shapes (n_frequencies, n_moving), the third (n_frequencies,). The shares are those that each single other input, and all
         # others together, do not explain, shapes (n_frequencies, n_moving, n_moving) and (n_frequencies, n_moving).
-        n_terms, n_inputs = self._order + 1, self._moving.size
+        n_terms, n_inputs = _ORDER + 1, self._moving.size
         reach = max(0.5 * w * s.line for s, w in zip(self._spectra, self._widths, strict=True))
         collected: tuple[list[NDArray[np.complex128]], ...] = ([], [], [])
         absorbed = np.zeros(omega.size, dtype=np.intp)

@@ -22,7 +22,7 @@ import numpy as np
 import scipy.signal
 from numpy.typing import NDArray
 
-from rigsight.errors import InputError, check_in_range, check_option
+from rigsight.errors import InputError, check_option
 from rigsight.frequency.frequency_response import FrequencyResponse
 from rigsight.frequency.signal_pair import (
     check_alike,
@@ -48,12 +48,10 @@ def averaged_response(
     resolution: float,
     *,
     estimator: Estimator = "H1",
-    window: str = "hann",
-    overlap: float = 0.5,
     hold: Hold = "band_limited",
     band: tuple[float, float] | None = None,
 ) -> FrequencyResponse:
-    """Return the frequency response from cross and auto spectra averaged over segments.
+    """Return the frequency response from cross and auto spectra averaged over Hann windows that overlap by half.
 
     Parameters
     ----------
@@ -66,10 +64,6 @@ def averaged_response(
     estimator
         ``"H1"`` is unbiased for noise on the response, ``"H2"`` for noise on the source, ``"Hv"`` for the same relative
         noise on both; it is the geometric mean of the other two.
-    window
-        Name of a window of ``scipy.signal.get_window``.
-    overlap
-        Share of a segment that the next one repeats, 0 to 0.9.
     hold
         Hold of the source between its samples: the default for a measured source, the record's hold for a commanded input
         (see `hold_response`).
@@ -95,25 +89,19 @@ def averaged_response(
     several = [records] if isinstance(records, Record) else list(records)
     check_alike(several, source, response)
     check_option("The estimator", estimator, get_args(Estimator))
-    check_in_range("The overlap", overlap, 0.0, 0.9)
     dt = several[0].dt
     shortest = min(several, key=lambda record: record.n_samples)
     what = f"Record '{shortest.name}'"
     check_resolution(resolution, shortest.n_samples * dt, 1.0, what)
     length = round(2.0 * math.pi / (resolution * dt))
-    step = length - math.floor(overlap * length)
+    step = length - length // 2
     counts = np.array([1 + (record.n_samples - length) // step for record in several])
     if counts.sum() < 2:
         raise InputError(
             f"{what} holds one segment of {length * dt:.4g} s, and a single segment has no coherence: allow a resolution of "
             f"{2.0 * resolution:.4g} rad/s, or give more records."
         )
-    try:
-        weights = scipy.signal.get_window(window, length)
-    except ValueError:
-        raise InputError(
-            f"The window '{window}' is not known to scipy.signal.get_window; use one such as 'hann'."
-        ) from None
+    weights = scipy.signal.get_window("hann", length)
     omega = line_frequencies(length, dt)
     spectra = _spectra(several, source, response, weights, length - step, counts)[:, 1 : omega.size + 1]
     kept = excited(omega, spectra[0].real, band, f"{what}: the source '{source}'")
@@ -137,7 +125,7 @@ def averaged_response(
         variance=relative * np.abs(values / held) ** 2,
         coherence=coherence,
         records=tuple(record.name for record in several),
-        method=f"{estimator}, {window} window, {int(counts.sum())} segments of {length * dt:.4g} s",
+        method=f"{estimator}, hann window, {int(counts.sum())} segments of {length * dt:.4g} s",
     )
 
 
@@ -183,13 +171,7 @@ class PlainRatio(FrequencyResponse):
     hold: Hold
 
     def free_motions(self, poles: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Return a basis of the free motions over the drive, shape (n_frequencies, n_poles).
-
-        Parameters
-        ----------
-        poles
-            Poles of the form [1/s], shape (n_poles,).
-        """
+        """Return a basis of the free motions with poles [1/s] over the drive, shape (n_frequencies, n_poles)."""
         return np.asarray(_free_motions(self.omega, self.dt, poles) / self.drive[:, None])
 
     def free_motion(self, weights: Floats, poles: NDArray[np.complex128]) -> Floats:
@@ -207,17 +189,7 @@ def _free_motions(omega: Floats, dt: float, poles: NDArray[np.complex128]) -> ND
 
 
 def plain_ratio(record: Record, local: FrequencyResponse, hold: Hold) -> PlainRatio:
-    """Return the plain ratio at the lines of a local model of the same record, with the noise that this found.
-
-    Parameters
-    ----------
-    record
-        The record.
-    local
-        Response of its source and response by a local model, whose `line_noise` is known.
-    hold
-        Hold of the source between its samples.
-    """
+    """Return the plain ratio at the lines of a local model of the same record, with the noise that this found."""
     assert local.line_noise is not None
     every = line_frequencies(record.n_samples, record.dt)
     lines = np.searchsorted(every, local.omega * (1.0 - 1e-9)) + 1

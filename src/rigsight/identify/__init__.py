@@ -27,7 +27,6 @@ from rigsight.identify.hysteresis import loop_area as loop_area
 from rigsight.identify.information import answers_to_states as answers_to_states
 from rigsight.identify.joint import JointFit as JointFit
 from rigsight.identify.joint import KindFit as KindFit
-from rigsight.identify.joint import fit_jointly as fit_jointly
 from rigsight.identify.record_offsets import OFFSETS_MEND as OFFSETS_MEND
 from rigsight.identify.record_offsets import DifferingMeans as DifferingMeans
 from rigsight.identify.record_offsets import differing_means as differing_means

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 from scipy.stats import chi2, norm
@@ -19,15 +20,13 @@ from rigsight.simulate import Structure
 
 _NOISE_ROUNDS = 3
 _SETTLED = 0.02
-_DIFFERENT = 0.01
-"""Probability of a difference by chance, below which two parameter sets count as different."""
 
 
 @dataclass(frozen=True)
 class KindFit:
     """The fit of one kind of records alone."""
 
-    kind: str  # ``"sweep"``, ``"step"``, ..., or the name of its group
+    kind: str  # the name of its group
     fit: FitResult  # fit of the records of this kind alone
     # By parameter: this kind's value minus the joint one, in standard errors of this kind's; NaN if it is
     # undetermined.
@@ -43,7 +42,6 @@ class JointFit:
     kinds: tuple[KindFit, ...]  # the fits of each kind alone
     # Probability of such differences between the kinds by chance, if one set fits all (chi-squared).
     probability: float
-    statement: str  # the answer in words
 
     def interval(self, name: str, level: float = LEVEL) -> tuple[float, float]:
         """Return the confidence interval of a fitted parameter of the joint set."""
@@ -55,55 +53,28 @@ def fit_jointly(
     structure: Structure,
     records: Sequence[Record],
     constants: Mapping[str, float],
-    known: Mapping[str, float] | None = None,
-    start: Mapping[str, float] | None = None,
+    known: Mapping[str, float],
+    start: Mapping[str, float],
     output_noise: Mapping[str, float] | None = None,
-    group_of: Callable[[Record], str] | None = None,
+    group_of: Callable[[Record], str] = attrgetter("origin"),
 ) -> JointFit:
-    """Fit one parameter set to sweeps and steps together, and one to each kind for comparison.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    records
-        Records of at least two kinds (``Record.kind``).
-    constants
-        The rig's constants by name.
-    known
-        Parameters that are held at their value.
-    start
-        Start values, required for parameters of effects; missing ones of the rig are estimated from the spectra.
-    output_noise
-        Standard deviation of the residuals of each output. Default: estimated from the joint fit's own residuals, repeatedly.
-    group_of
-        Name of the group in which a record is compared, instead of its kind; a single group is then allowed, without comparison.
-
-    Raises
-    ------
-    InputError
-        If all records are of one kind, a motion that an input prescribes never moves, or an effect's start value is missing.
-    """
-    label = group_of or (lambda record: record.kind)
-    groups = {name: [r for r in records if label(r) == name] for name in dict.fromkeys(map(label, records))}
-    if group_of is None and len(groups) < 2:
-        found = f"all {len(records)} are of kind '{next(iter(groups))}'" if groups else "there are none"
-        raise InputError(
-            f"A joint fit compares records of different kinds, and {found}. Add steps to sweeps or sweeps to steps (Record.kind) "
-            "or use GreyBoxFit for one kind."
-        )
+    """Fit one parameter set to all records, with parameters held that are known, and one to each group for comparison."""
+    # A start is required for parameters of effects; missing ones of the rig are estimated from the spectra. The noise of each
+    # output is estimated from the joint fit's own residuals, repeatedly, unless it is given.
+    groups = {
+        name: [r for r in records if group_of(r) == name] for name in dict.fromkeys(map(group_of, records))
+    }
     _check_moves(structure, records)
-    held = dict(known or {})
-    begin = {**dict(start or {}), **constants, **held}
+    begin = {**start, **constants, **known}
     if any(p.name not in begin for p in structure.rig.parameters):
-        begin = {**linear_start(structure.rig, records, constants, held), **begin}
+        begin = {**linear_start(structure.rig, records, constants, known), **begin}
     begin = {**{p.name: p.default for p in structure.parameters if p.default is not None}, **begin}
     missing = [name for name in structure.names if name not in begin]
     if missing:
         raise InputError(
             f"Start values are missing for: {', '.join(missing)}. Give them as start, or as known to keep them."
         )
-    fixed = {*held, *constants}
+    fixed = {*known, *constants}
     free = tuple(p.name for p in structure.parameters if p.fitted and p.name not in fixed)
     scales = characteristic_scales(structure.rig, records, begin)
     noise = dict(output_noise) if output_noise is not None else _spread(structure, records)
@@ -119,10 +90,7 @@ def fit_jointly(
     for kind, own in groups.items():
         alone = GreyBoxFit(structure, own, scales, noise).fit(fit.values, free)
         kinds.append(KindFit(kind, alone, _shift(alone, fit)))
-    probability, differing = _same_set(kinds)
-    compared = "Records" if group_of else " and ".join(f"{k.kind}s" for k in kinds)
-    statement = _statement(compared, probability, differing, fit)
-    return JointFit(fit, noise, tuple(kinds), probability, statement)
+    return JointFit(fit, noise, tuple(kinds), _same_set(kinds))
 
 
 def _check_moves(structure: Structure, records: Sequence[Record]) -> None:
@@ -159,8 +127,8 @@ def _shift(alone: FitResult, joint: FitResult) -> dict[str, float]:
     return {name: (alone.values[name] - joint.values[name]) / errors[name] for name in joint.free}
 
 
-def _same_set(kinds: Sequence[KindFit]) -> tuple[float, tuple[str, ...]]:
-    """Test whether all kinds have one set, by deviations from the weighted mean; records of different kinds are independent."""
+def _same_set(kinds: Sequence[KindFit]) -> float:
+    """Return the probability of such differences if all kinds, which are independent, have one set."""
     # Parameters that are undetermined for one of the kinds (alone or in combination with others) are not included.
     free = kinds[0].fit.free
     usable = [
@@ -169,7 +137,7 @@ def _same_set(kinds: Sequence[KindFit]) -> tuple[float, tuple[str, ...]]:
         if all(np.isfinite(k.fit.covariance[i, i]) and np.isfinite(k.shift[name]) for k in kinds)
     ]
     if len(kinds) < 2 or not usable or not all(k.fit.residuals for k in kinds):
-        return float("nan"), ()
+        return float("nan")
     picked = np.ix_(usable, usable)
     values = [np.array([k.fit.values[free[i]] for i in usable]) for k in kinds]
     size = np.sqrt(np.mean([np.diag(k.fit.covariance[picked]) for k in kinds], axis=0))
@@ -178,25 +146,4 @@ def _same_set(kinds: Sequence[KindFit]) -> tuple[float, tuple[str, ...]]:
     distance = sum(
         float((v / size - mean) @ w @ (v / size - mean)) for w, v in zip(weights, values, strict=True)
     )
-    degrees = len(usable) * (len(kinds) - 1)
-    differing = []
-    for j, i in enumerate(usable):
-        spread = [v[j] for v in values]
-        error = float(np.sqrt(sum(k.fit.covariance[i, i] for k in kinds)))
-        if max(spread) - min(spread) > float(norm.ppf(1.0 - _DIFFERENT / 2.0)) * error:
-            differing.append(free[i])
-    return float(chi2.sf(distance, degrees)), tuple(differing)
-
-
-def _statement(names: str, probability: float, differing: Sequence[str], fit: FitResult) -> str:
-    if not np.isfinite(probability):
-        return f"{names} have no common parameter that each of them determines; nothing can be compared."
-    if not fit.success:
-        return f"The joint fit did not converge: {fit.message}"
-    if probability >= _DIFFERENT:
-        return f"One parameter set fits {names}: differences this large arise by chance with probability {probability:.2g}."
-    which = f" They differ in {', '.join(differing)}." if differing else ""
-    return (
-        f"{names} have different parameters under this model (probability of chance {probability:.1g}).{which} The model lacks "
-        f"an effect that depends on amplitude or frequency."
-    )
+    return float(chi2.sf(distance, len(usable) * (len(kinds) - 1)))

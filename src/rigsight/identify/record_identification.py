@@ -34,8 +34,7 @@ from rigsight.identify.transfer.transfer_form import Order, TransferFit
 from rigsight.identify.transfer.transfer_function import MISFIT, fit_frequency_response
 from rigsight.records.record import Hold, Record
 from rigsight.records.signals import instrument_of, is_constant
-from rigsight.rigs import Rig
-from rigsight.rigs.parts import Sensor
+from rigsight.rigs import Rig, Sensor
 
 _SURE = 0.1
 """Relative standard error above which a line is no evidence of a peak."""

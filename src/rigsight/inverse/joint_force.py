@@ -18,7 +18,8 @@ from rigsight.effects.placed import ByIdentity
 from rigsight.identify.rig_equations import FUNCTIONS
 from rigsight.inverse.measured_motion import RecordMotion, nearest_force, speed_at_rest
 from rigsight.records import Record
-from rigsight.rigs import Joint, Rig, evaluated, rig_of_tables
+from rigsight.rigs import Joint, Rig, evaluated
+from rigsight.rigs.reading.rig_file import rig_of_tables
 from rigsight.simulate import Structure, compose, simulate
 
 Floats = NDArray[np.float64]

@@ -16,8 +16,7 @@ from scipy.signal import sawtooth
 
 from rigsight.errors import InputError, nearest
 from rigsight.excitation import log_sweep, multisine, multisine_lines
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 from rigsight.rigs import Rig
 
 SHARES = (1.0, 0.3, 0.1)
@@ -59,13 +58,7 @@ class Limit:
 
 
 def read_limits(rig: Rig, asked: Sequence[str]) -> tuple[Limit, ...]:
-    """Return the limits that texts such as ``x=0.02`` and ``d(x)=0.5`` state; those on constants are left to `read_payloads`.
-
-    Raises
-    ------
-    InputError
-        If a name is unknown, a signal stated twice, or a value not a positive number.
-    """
+    """Return the limits that texts such as ``x=0.02`` or ``d(x)=0.5`` set, by input or sensor."""
     known = {
         limit.name: limit
         for signal in (*rig.inputs, *rig.outputs)
@@ -90,13 +83,7 @@ def read_limits(rig: Rig, asked: Sequence[str]) -> tuple[Limit, ...]:
 
 
 def read_payloads(rig: Rig, asked: Sequence[str]) -> tuple[Mapping[str, float], ...]:
-    """Return the values that constants of a rig may have in an experiment, such as an added mass, by texts such as ``m=2``.
-
-    Raises
-    ------
-    InputError
-        If a value lies outside of the range of its constant.
-    """
+    """Return the values that texts such as ``m=2`` give constants of a rig."""
     constants = {constant.name: constant for constant in rig.constants}
     return tuple({name: constants[name].check(value)} for _, name, value in _read(asked) if name in constants)
 

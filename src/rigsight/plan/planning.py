@@ -15,8 +15,7 @@ from rigsight.plan.experiments import Bench, Limit, with_recorded_range
 from rigsight.plan.rivals import Named, Truth, contest_of
 from rigsight.plan.search import Scored, Search, posterior, predicted, refitted
 from rigsight.plan.usual_sizes import truths_of_usual_size
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 
 SCHEMA_VERSION = 1
 Sizes = Literal["fitted", "usual", "usual, no records"]
@@ -56,46 +55,21 @@ class Trials:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """An experiment to be played.
+    """An experiment to be played."""
 
-    Attributes
-    ----------
-    title, rig
-        Of the campaign.
-    sizes
-        Whether the rivals were fitted to the records or are of a usual size.
-    what
-        The experiment in words.
-    record
-        Its inputs, with the constants of the rig that it needs.
-    limits
-        With the largest value in the simulations of all rivals.
-    rivals
-        Most probable first.
-    errors
-        Error to be expected of each output.
-    now
-        Expected probability of the truth before.
-    without_noise
-        Expected probability of the truth afterwards for the numbers so far and readings without noise.
-    trials
-        The simulated outcomes.
-    others
-        Further experiments with their linearized worth.
-    """
-
+    # Of the campaign.
     title: str
     rig: str
-    sizes: Sizes
-    what: str
-    record: Record
-    limits: tuple[tuple[Limit, float], ...]
-    rivals: tuple[Prediction, ...]
-    errors: Mapping[str, float]
-    now: float
-    without_noise: float
-    trials: Trials
-    others: tuple[Scored, ...]
+    sizes: Sizes  # whether the rivals were fitted to the records or are of a usual size
+    what: str  # the experiment in words
+    record: Record  # its inputs, with the constants of the rig that it needs
+    limits: tuple[tuple[Limit, float], ...]  # with the largest value in the simulations of all rivals
+    rivals: tuple[Prediction, ...]  # most probable first
+    errors: Mapping[str, float]  # error to be expected of each output
+    now: float  # expected probability of the truth before
+    without_noise: float  # the same afterwards for the numbers so far and readings without noise
+    trials: Trials  # the simulated outcomes
+    others: tuple[Scored, ...]  # further experiments with their linearized worth
 
     @property
     def promised(self) -> float:
@@ -153,36 +127,9 @@ def plan_experiment(
     sizes: Sizes = "fitted",
     payloads: Sequence[Mapping[str, float]] = (),
 ) -> Plan:
-    """Return the experiment that separates rivals best.
-
-    Parameters
-    ----------
-    campaign
-        With the records so far.
-    named
-        At least two rivals.
-    limits
-        To be kept in the simulations of all rivals.
-    seconds
-        Duration of the experiment.
-    seed
-        Seed of drawn phases and noise.
-    say
-        Called with what has been done.
-    draws
-        Simulated outcomes for each rival as the truth.
-    sizes
-        Sizes of the rivals.
-    payloads
-        Values that constants of the rig may have in the experiment, beside those of the records.
-
-    Raises
-    ------
-    InputError
-        If the rig has no input, or no experiment keeps the limits.
-    SimulationError
-        If a rival cannot be simulated near the records.
-    """
+    """Return the experiment of so many seconds that separates rivals best within limits that hold in the simulations of all."""
+    # Payloads are values that constants of the rig may have in the experiment, beside those of the records; `draws` outcomes are
+    # simulated for each rival as the truth.
     rig, dt = campaign.rig, campaign.estimation[0].dt
     if not rig.inputs:
         raise InputError(f"{rig.name} has no input, so there is nothing to plan.")

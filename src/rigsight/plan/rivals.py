@@ -15,11 +15,9 @@ from rigsight.diagnose.search.horizon import restores, windowing_of
 from rigsight.diagnose.search.single_effects import fit_candidate, reidentify
 from rigsight.effects import Effect
 from rigsight.errors import SimulationError
-from rigsight.identify import FitResult, GreyBoxFit, IdleThreads
-from rigsight.identify.fit.coordinates import Coordinates
+from rigsight.identify import Coordinates, FitResult, GreyBoxFit, IdleThreads
 from rigsight.identify.fit.windows import Windowing, liveliest
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 
 OLD = 8000
 """Samples of the most excited stretches of all records together that rivals are fitted to again and again. Fewer than there are
@@ -86,10 +84,8 @@ class Remainder:
         }
 
     def drawn(self, n_samples: int, rng: np.random.Generator) -> Floats:
-        """Return noise with the spectrum of the remainder and random phases, shape (n_samples, n_outputs).
-
-        J. Theiler et al., Physica D 58 (1992) 77.
-        """
+        """Return noise with the spectrum of the remainder and random phases, shape (n_samples, n_outputs)."""
+        # J. Theiler et al., Physica D 58 (1992) 77.
         spectrum = np.abs(np.fft.rfft(self.samples, axis=0))
         old, new = np.linspace(0.0, 1.0, spectrum.shape[0]), np.linspace(0.0, 1.0, n_samples // 2 + 1)
         lines = np.column_stack([np.interp(new, old, column) for column in spectrum.T])
@@ -157,13 +153,7 @@ def contest_of(
     say: Callable[[str], None],
     remainder: Remainder | None = None,
 ) -> Contest:
-    """Fit rivals to the estimation records of a campaign; `remainder` is what the best model leaves if these do not show it.
-
-    Raises
-    ------
-    SimulationError
-        If a rival cannot be simulated near the records.
-    """
+    """Fit rivals to the estimation records of a campaign; `remainder` is what the best model leaves if these do not show it."""
     context, windowing = prepared(campaign)
     alone = reidentify(context, context.start)
     fits = []

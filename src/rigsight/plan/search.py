@@ -21,8 +21,7 @@ from rigsight.identify.fit.fit_data import FitData
 from rigsight.identify.fit.settled_states import guessed_states
 from rigsight.plan.experiments import SHARES, Bench, Experiment, Limit, use_of
 from rigsight.plan.rivals import Contest, Rival, Truth
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 from rigsight.simulate import simulate
 
 _ACCURACY = 1e-4
@@ -47,17 +46,7 @@ def predicted(rival: Rival, record: Record) -> Record:
 
 
 def about(contest: Contest, rival: Rival, readings: Record) -> float:
-    """Return the expected logarithm of the likelihood ratio against a rival whose numbers are fitted again, linearized.
-
-    Parameters
-    ----------
-    contest
-        The rivals.
-    rival
-        The one that is wrong.
-    readings
-        A record with the readings of the right one.
-    """
+    """Return the expected log likelihood ratio of readings of the right rival against one that is fitted again, linearized."""
     new, errors = contest.windowing.cut([readings]), contest.remainder.errors(readings)
     problem = GreyBoxFit(rival.fit.structure, new, contest.context.scales, errors)
     found = problem.normal_equations(rival.fit.values, rival.fit.free)
@@ -145,13 +134,7 @@ class Search:
     def best(
         self, constants: Sequence[Mapping[str, float]], rng: np.random.Generator, say: Callable[[str], None]
     ) -> list[Scored]:
-        """Return the experiments of the library and the changed ones, the best first.
-
-        Raises
-        ------
-        InputError
-            If no experiment keeps the limits.
-        """
+        """Return the experiments of the library and the changed ones that keep the limits, the best first."""
         found: list[Scored] = []
         for experiment in self._bench.library(constants, rng):
             largest = self._largest(experiment)

@@ -16,13 +16,11 @@ from rigsight.campaign import Campaign
 from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.diagnose.search.starts import start_values
-from rigsight.identify import FitResult
-from rigsight.identify.fit.coordinates import Coordinates
+from rigsight.identify import Coordinates, FitResult
 from rigsight.identify.fit.windows import Windowing, liveliest
 from rigsight.inverse import LAW_ERROR
 from rigsight.plan.rivals import OLD, REACH, Contest, Named, Remainder, Rival, Truth, contest_of, prepared
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 from rigsight.simulate import record_values, simulate
 
 _OF_SENSORS = 1e-3
@@ -36,26 +34,9 @@ def truths_of_usual_size(
     records_count: bool,
     say: Callable[[str], None],
 ) -> list[Truth]:
-    """Return each rival as the truth with the size at which a search for it would start.
-
-    Parameters
-    ----------
-    campaign
-        Its records give the motion and the noise.
-    named
-        The rivals.
-    n_samples
-        Length of the record that is planned.
-    records_count
-        Whether the records are measured, so that they tell of the rivals as well; else the planned one is the first.
-    say
-        Called with what has been done.
-
-    Raises
-    ------
-    SimulationError
-        If a rival cannot be simulated.
-    """
+    """Return each rival as the truth with the size at which a search for it would start, for a record of `n_samples`."""
+    # The records give motion and noise. Where they count, as measured ones do, they tell of the rivals as well; else the planned
+    # one is the first.
     moving = liveliest(campaign.estimation, campaign.rig, OLD)
     context, windowing = prepared(replace(campaign, records=moving))
     base = reidentify(context, context.start).fit

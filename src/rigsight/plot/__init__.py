@@ -9,7 +9,6 @@ from rigsight.plot.diagnosis import force_loops as force_loops
 from rigsight.plot.diagnosis import gap_budget as gap_budget
 from rigsight.plot.diagnosis import ranking as ranking
 from rigsight.plot.diagnosis import step_window as step_window
-from rigsight.plot.drawing import DisplayScale as DisplayScale
 from rigsight.plot.drawing import display_scale as display_scale
 from rigsight.plot.drawing import encoded as encoded
 from rigsight.plot.drawing import envelope as envelope
@@ -41,7 +40,6 @@ from rigsight.plot.model_comparison import model_styles as model_styles
 from rigsight.plot.rig_picture import PlaceMark as PlaceMark
 from rigsight.plot.rig_picture import rig_picture as rig_picture
 from rigsight.plot.signals import channel_plots as channel_plots
-from rigsight.plot.signals import planned_experiment as planned_experiment
 
 if TYPE_CHECKING:
     # For packages that pass figures on and must not import matplotlib.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigsight.plan import Plan
+from rigsight.plan.planning import Plan
 from rigsight.plot.drawing import (
     GIVEN,
     MEASURED,
@@ -54,13 +54,7 @@ def channel_plots(channels: Sequence[Channel], time: Channel | None) -> Figure:
 
 @style()
 def planned_experiment(plan: Plan) -> Figure:
-    """Draw a planned experiment.
-
-    Parameters
-    ----------
-    plan
-        The plan.
-    """
+    """Draw a planned experiment."""
     record, others = plan.record, plan.rivals[1:]
     inputs, outputs = list(record.signals), list(plan.errors)
     n_panels = len(inputs) + 2 * len(outputs)

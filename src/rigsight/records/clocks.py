@@ -36,10 +36,7 @@ def is_prefixed_time(name: str) -> bool:
 
 
 def own_clocks(names: Sequence[str], further: Sequence[int] = ()) -> Mapping[int, int]:
-    """Return the number of each channel -> the number of the time that is its own, where a file shows that; else without it.
-
-    `further` are times that are known by more than their names.
-    """
+    """Return the number of each channel -> that of its own time where a file shows it; `further` times need no such name."""
     # A file shows it by names (``Time Force`` beside ``Force``), by groups (a time in the group of a channel, or in the nearest
     # one around it), or by order (columns of time of one name, each in front of its signals). One time alone belongs to no one in
     # particular.

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from rigsight.check import Check, EffectMatrix, Told, Visible
+from rigsight.check import Check, Told, Visible
+from rigsight.check.effect_matrix import EffectMatrix
 from rigsight.effects import kind_of
 from rigsight.report.labels import effect_label, listed, place_label
 from rigsight.report.page import rendered

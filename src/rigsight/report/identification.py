@@ -12,7 +12,7 @@ from rich.padding import Padding
 from rich.table import Table
 
 from rigsight.diagnose.result import Estimate
-from rigsight.identify import FitResult
+from rigsight.identify import FitResult, PhysicalEstimates
 from rigsight.identify.hysteresis.derived import LEVEL, Derived
 from rigsight.identify.identification import (
     HysteresisIdentification,
@@ -21,7 +21,6 @@ from rigsight.identify.identification import (
     RecordScore,
 )
 from rigsight.identify.linear_view import LinearView
-from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
 from rigsight.plot import with_unit
 from rigsight.records.record import Floats
 from rigsight.report import labels

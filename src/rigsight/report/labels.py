@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 from rigsight.effects import AT, Effect, kind_of, placed
 from rigsight.metrics import TWO_SIDED
 from rigsight.parameters import Parameter
-from rigsight.rigs import Rig, declared_rig
+from rigsight.rigs import Rig
+from rigsight.rigs.built_in import declared_rig
 from rigsight.units import behind
 
 if TYPE_CHECKING:

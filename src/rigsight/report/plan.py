@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from rigsight.plan import Plan, Sizes
-from rigsight.plan.planning import DECIDED
+from rigsight.plan import Sizes
+from rigsight.plan.planning import DECIDED, Plan
 from rigsight.report.figures import page_figure
 from rigsight.report.labels import percent
 from rigsight.report.page import rendered

@@ -25,8 +25,7 @@ from rigsight.frequency import FrequencyResponse
 from rigsight.identify.transfer.record_response import Method
 from rigsight.metrics import TWO_SIDED, nrmse
 from rigsight.plot.frequency_responses import decibel, thinned
-from rigsight.records import Record
-from rigsight.records.record import Floats, Hold, Kind
+from rigsight.records import Floats, Hold, Kind, Record
 from rigsight.records.stamps import time_label, time_origin
 from rigsight.report import figures
 from rigsight.report.labels import gap_percent, rig_of, sentence_case

@@ -3,7 +3,6 @@
 from rigsight.rigs.built_in import RIGS as RIGS
 from rigsight.rigs.built_in import KnownRigs as KnownRigs
 from rigsight.rigs.built_in import __getattr__ as __getattr__
-from rigsight.rigs.built_in import declared_rig as declared_rig
 from rigsight.rigs.built_in import rig_file_text as rig_file_text
 from rigsight.rigs.built_in import rotational as rotational
 from rigsight.rigs.controller import Controller as Controller

@@ -38,26 +38,8 @@ RIGS = KnownRigs()
 
 
 def declared_rig(name: str, declaration: Mapping[str, Any], source: str = "declaration") -> Rig | None:
-    """Return the rig of a model or a result: the one that it declares, else a built-in one.
-
-    Parameters
-    ----------
-    name
-        Its name.
-    declaration
-        The tables of its file; empty in a result that was written before rigs were carried along.
-    source
-        How messages call the declaration.
-
-    Returns
-    -------
-    None where nothing is declared and no built-in rig has the name.
-
-    Raises
-    ------
-    InputError
-        Naming the table and key of what is wrong in the declaration.
-    """
+    """Return the rig of a model or a result: the one that it declares, else a built-in one, None where there is neither."""
+    # Results that were written before rigs were carried along declare none.
     built_in = RIGS.get(name)
     if not declaration or (built_in is not None and built_in.declaration == declaration):
         return built_in

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from rigsight.effects import symbols
-from rigsight.effects.effect import Effect
+from rigsight.effects import Effect, symbols
 from rigsight.effects.symbols import derivative, positive_part
 from rigsight.rigs.mechanism import Mechanism
 from rigsight.rigs.parts import Drive, reading_symbol

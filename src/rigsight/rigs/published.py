@@ -10,7 +10,7 @@ from typing import Any
 
 from rigsight.effects import effect_named
 from rigsight.errors import InputError, check_option
-from rigsight.parameters import Parameter, ParameterSet
+from rigsight.parameters import complete_values
 from rigsight.rigs import RIGS
 from rigsight.rigs.built_in import tables_in
 
@@ -66,7 +66,7 @@ def parse_published_set(name: str, text: str) -> PublishedSet:
 
 def _checked(name: str, content: dict[str, Any]) -> PublishedSet:
     rig = RIGS[check_option("rig", content["rig"], RIGS)]
-    constants = _values(rig.constants, content["constants"])
+    constants = complete_values(rig.constants, content["constants"])
     alternatives = {p.name: p for p in rig.alternative_parameters}
     own = dict(content["parameters"])
     given = {key: alternatives[key].check(own.pop(key)) for key in [*own] if key in alternatives}
@@ -77,17 +77,12 @@ def _checked(name: str, content: dict[str, Any]) -> PublishedSet:
         source=str(content["source"]),
         rig=rig.name,
         constants=constants,
-        parameters=_values(rig.parameters, own),
+        parameters=complete_values(rig.parameters, own),
         effects={
-            effect: _values(effect_named(effect).parameters, values)
+            effect: complete_values(effect_named(effect).parameters, values)
             for effect, values in content.get("effects", {}).items()
         },
         given=given,
         amplitude=content.get("amplitude"),
         notes=str(content.get("notes", "")),
     )
-
-
-def _values(parameters: tuple[Parameter, ...], values: Mapping[str, float]) -> dict[str, float]:
-    defaults = {p.name: p.default for p in parameters if p.default is not None}
-    return ParameterSet.from_mapping(parameters, {**defaults, **values}).to_mapping()

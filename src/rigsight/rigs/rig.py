@@ -9,8 +9,7 @@ from typing import Any
 
 import sympy as sp
 
-from rigsight.effects import symbols
-from rigsight.effects.effect import Effect, Place
+from rigsight.effects import Effect, Place, symbols
 from rigsight.effects.symbols import derivative
 from rigsight.parameters import Parameter
 from rigsight.rigs.controller import Controller, controller_of

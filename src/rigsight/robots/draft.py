@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
-from rigsight.errors import InputError
+from rigsight.errors import InputError, needing
 from rigsight.rigs import Rig, rig_of_tables
 from rigsight.robots.energies import Energies, energies_of
 from rigsight.robots.free_joints import (
@@ -264,12 +264,8 @@ def _sum(*terms: sp.Expr) -> str:
 
 def rig_text(draft: RigDraft, source: str, folder: Path) -> str:
     """Return the text of a rig file."""
-    try:
+    with needing("Writing a rig file", "tomli-w", "mujoco"):
         import tomli_w
-    except ImportError:
-        raise InputError(
-            "Writing a rig file needs tomli-w, which is not installed: pip install 'rigsight[mujoco]'."
-        ) from None
     lines = [f"Written by rigsight init from {source}.", *draft.notes]
     if draft.left_out:
         lines += ["Not taken over:", *(f"- {what}" for what in draft.left_out)]

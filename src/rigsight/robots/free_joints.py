@@ -74,10 +74,8 @@ def start_of(
     free_joints: Sequence[FreeJoint],
     numbers: DeclaredNumbers,
 ) -> dict[str, str]:
-    """Return ``[initial]`` of a model with free or ball joints, of constants that a record may set; empty for other models.
-
-    Nothing holds a free joint, so its model does not start in an equilibrium but as its first keyframe, or as it is drawn.
-    """
+    """Return ``[initial]`` of a model with free or ball joints, of constants that a record may set; empty for other models."""
+    # Nothing holds a free joint, so its model does not start in an equilibrium but as its first keyframe, or as it is drawn.
     if not free_joints:
         return {}
     at = model.key_qpos[0] if model.nkey else model.qpos0

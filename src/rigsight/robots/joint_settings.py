@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rigsight.effects import Effect
-from rigsight.errors import InputError, check_in_range
+from rigsight.errors import check_in_range, needing
 from rigsight.robots.draft import RobotFile
 from rigsight.robots.tables import Field
 from rigsight.robots.writing_back import WrittenBack, in_words, read_for
@@ -161,12 +161,8 @@ class _Settings:
 
 def isaac_settings(model: Model, source: Path, step: float | None = None) -> WrittenBack:
     """Return the YAML of Isaac Lab's actuators for a model that was made from an MJCF or URDF file."""
-    try:
+    with needing("Writing for Isaac Lab", "PyYAML", "mujoco"):
         import yaml
-    except ImportError:
-        raise InputError(
-            "Writing for Isaac Lab needs PyYAML, which is not installed: pip install 'rigsight[mujoco]'."
-        ) from None
     settings = joint_settings(model, source, step)
     groups: dict[str, dict[str, Any]] = {}
     for joint in settings.joints:

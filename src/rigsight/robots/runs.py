@@ -11,14 +11,12 @@ import numpy as np
 
 from rigsight.errors import InputError
 from rigsight.metrics import nrmse
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 from rigsight.rigs import Rig, rig_of_tables
 from rigsight.robots.draft import RigDraft, with_known_constants
 from rigsight.robots.tree import lock
 from rigsight.robots.writing_back import WrittenModel, write_back
-from rigsight.simulate import compose, simulate
-from rigsight.simulate.model import Model
+from rigsight.simulate import Model, compose, simulate
 
 if TYPE_CHECKING:
     import mujoco
@@ -177,24 +175,8 @@ class WrittenGap:
 def gap_of_written(
     model: Model, source: Path, records: Sequence[Record], starts: Sequence[Floats]
 ) -> tuple[WrittenGap, ...]:
-    """Simulate records with a model and with the MuJoCo model into which it is written, both from one state.
-
-    Parameters
-    ----------
-    model
-        The model that is written; constants of a record replace its own, in both.
-    source
-        MJCF or URDF file from which the rig was made.
-    records
-        With the controls and readings of the rig.
-    starts
-        State of the model at the first sample of each, shape (n_states,) each.
-
-    Raises
-    ------
-    InputError
-        If a record lacks a control of the MuJoCo model, or no record has a reading of it.
-    """
+    """Simulate records with a model and with the MuJoCo model into which it is written, both from these states."""
+    # Constants of a record replace those of the model, in both.
     measured: dict[str, list[Floats]] = {}
     residuals: dict[str, list[tuple[Floats, Floats]]] = {}
     written: dict[tuple[tuple[str, float], ...], WrittenModel] = {}

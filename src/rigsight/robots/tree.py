@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigsight.errors import InputError, nearest
+from rigsight.errors import InputError, nearest, needing
 from rigsight.records.formats.known import file_size
 from rigsight.records.record import Floats
 
@@ -70,10 +70,7 @@ class TreeBody:
 
 
 def bodies_of(model: mujoco.MjModel, *, only_scalar: bool = True) -> tuple[TreeBody, ...]:
-    """Return the bodies of a model behind their parents, without the world, with their hinges and slides.
-
-    `only_scalar` refuses other joints.
-    """
+    """Return the bodies of a model behind their parents, without the world; joints are hinges and slides if `only_scalar`."""
     import mujoco
 
     kinds = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}
@@ -156,12 +153,8 @@ def load_spec(path: Path) -> mujoco.MjSpec:
 
     Where a mesh is missing, shapes are left out of bodies that have an inertia of their own: only what moves is taken over.
     """
-    try:
+    with needing("Reading MJCF and URDF", "MuJoCo", "mujoco"):
         import mujoco
-    except ImportError:
-        raise InputError(
-            "Reading MJCF and URDF needs MuJoCo, which is not installed: pip install 'rigsight[mujoco]'."
-        ) from None
     if file_size(path, "the model file") > LARGEST_FILE:
         raise InputError(f"{path}: is larger than {LARGEST_FILE / 1e6:g} MB, the limit for a model file.")
     try:

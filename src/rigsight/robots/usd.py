@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rigsight.errors import InputError, nearest
+from rigsight.errors import InputError, nearest, needing
 from rigsight.records.formats.known import file_size
 from rigsight.robots.joint_settings import JointSettings, SettingsOfJoint, joint_settings
 from rigsight.robots.writing_back import WrittenBack
@@ -62,12 +62,8 @@ def usd_layer(
 
     Above a stage of the robot the layer has it as its sublayer: it is opened instead of the stage.
     """
-    try:
+    with needing("Writing USD", "usd-core", "usd"):
         from pxr import Sdf, Usd, UsdGeom, UsdPhysics
-    except ImportError:
-        raise InputError(
-            "Writing USD needs usd-core, which is not installed: pip install 'rigsight[usd]'."
-        ) from None
     settings = joint_settings(model, source, step, has_integral_gain=True)
     layer = Sdf.Layer.CreateAnonymous(".usda") if robot is None else _layer_above(robot)
     stage = Usd.Stage.Open(layer)

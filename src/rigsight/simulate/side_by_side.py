@@ -105,15 +105,8 @@ def choose_substeps(
     accuracy: float,
     most: int = _SUBSTEPS[-1],
 ) -> Substeps:
-    """Return few substeps whose error relative to the accurate integrator is below `accuracy`, with fewest for slow motion.
-
-    Because of kinks, the error decreases with the square of the step; numbers that this rule excludes are not tried.
-
-    Raises
-    ------
-    SimulationError
-        If no number of substeps up to `most` reaches it, or the accurate integrator itself fails.
-    """
+    """Return few substeps whose error relative to the accurate integrator is below `accuracy`, with fewest for slow motion."""
+    # Because of kinks, the error decreases with the square of the step; numbers that this rule excludes are not tried.
     if structure.late_inputs is None:
         return Substeps(1)
     taken = np.zeros(held.n_pieces, dtype=np.intc)

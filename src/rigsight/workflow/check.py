@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from rigsight.campaign import Campaign
-from rigsight.check import Check, check_campaign
-from rigsight.check.campaign_check import PARTS
+from rigsight.check import Check
+from rigsight.check.campaign_check import PARTS, check_campaign
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.report.check import render_check
 from rigsight.rigs import Rig

@@ -22,9 +22,8 @@ from rigsight.identify.transfer.record_response import METHODS, Method
 from rigsight.plot import svg_text
 from rigsight.report.comparison import comparison_figures, render_comparison
 from rigsight.rigs import Rig
-from rigsight.simulate import compose
+from rigsight.simulate import Model, compose
 from rigsight.simulate.equilibrium import can_drift
-from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model, of_this_rig
 from rigsight.workflow.campaign.read_campaign import free_name, read_campaign
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels

@@ -14,8 +14,7 @@ from scipy.signal import lfilter
 from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.excitation import log_sweep, step
-from rigsight.records import Hold, Kind, Record, Role
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Hold, Kind, Record, Role
 from rigsight.rigs import RUNNING_GEAR, evaluated
 from rigsight.rigs.published import PublishedSet, published_sets
 from rigsight.simulate import Structure, compose, simulate

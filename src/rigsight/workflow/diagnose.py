@@ -151,7 +151,7 @@ class FitJournal:
     Used as a context: the file is removed if the context ends without an error, otherwise it is kept.
     """
 
-    def __init__(self, campaign: Path, going_on: Callable[[int], None] | None = None) -> None:
+    def __init__(self, campaign: Path, going_on: Callable[[int], None]) -> None:
         name = hashlib.sha256(
             f"{version('rigsight')} {campaign.resolve()}".encode("utf-8", "surrogatepass")
         ).hexdigest()[:24]
@@ -160,12 +160,7 @@ class FitJournal:
         self._own: dict[str, Mapping[str, Any]] = {}
         self._lock = threading.Lock()
         self._going_on = going_on
-        self._again: set[str] = set()
-
-    @property
-    def recalled(self) -> int:
-        """Number of reused fits; one that is asked for twice counts once."""
-        return len(self._again)
+        self._goes_on = False
 
     def __enter__(self) -> Self:
         try:
@@ -192,14 +187,12 @@ class FitJournal:
         """Return the outcome stored under a key, also of a fit of this process; None if there is none."""
         found = self._known.get(key)
         if found is None:
-            found = self._own.get(key)
-        else:
-            with self._lock:
-                # Not earlier: a campaign that was changed since has the same path but none of these fits.
-                is_first = not self._again
-                self._again.add(key)
-            if is_first and self._going_on is not None:
-                self._going_on(len(self._known))
+            return self._own.get(key)
+        with self._lock:
+            # Not earlier: a campaign that was changed since has the same path but none of these fits.
+            is_first, self._goes_on = not self._goes_on, True
+        if is_first:
+            self._going_on(len(self._known))
         return found
 
     def remember(self, key: str, outcome: Mapping[str, Any]) -> None:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 from rigsight.effects import Effect
 from rigsight.errors import InputError, check_option
-from rigsight.export import TARGETS, export_model
+from rigsight.export import TARGETS
+from rigsight.export.targets import export_model
 from rigsight.identify.fit.first_states import first_state
 from rigsight.records import Record
 from rigsight.rigs import Rig
@@ -102,7 +103,8 @@ def _robot(
     step: float | None,
     records: Sequence[Record],
 ) -> WrittenFile:
-    from rigsight.robots import gap_of_written, isaac_settings, usd_layer, write_back
+    from rigsight.robots import isaac_settings, usd_layer, write_back
+    from rigsight.robots.runs import gap_of_written
 
     if robot is None:
         raise InputError(

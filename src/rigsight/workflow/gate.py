@@ -16,8 +16,7 @@ from rigsight.errors import InputError, SimulationError
 from rigsight.json_data import json_data
 from rigsight.records import Record
 from rigsight.rigs import Rig
-from rigsight.simulate import structure_of_fit
-from rigsight.simulate.model import Model
+from rigsight.simulate import Model, structure_of_fit
 from rigsight.units import behind
 from rigsight.workflow.campaign.model_file import named_model
 from rigsight.workflow.gating import (

@@ -9,13 +9,16 @@ from pydantic import BaseModel, ValidationError
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
-from rigsight.check import check_campaign, holes_of
-from rigsight.check.campaign_check import PARTS
+from rigsight.check import holes_of
+from rigsight.check.campaign_check import PARTS, check_campaign
 from rigsight.diagnose.policy import FAMILIES
 from rigsight.effects import AT, CATALOGUE, Effect
 from rigsight.errors import InputError
-from rigsight.plan import Named, Plan, Sizes, plan_experiment, read_limits, read_payloads, use_of
-from rigsight.plot import planned_experiment, png_bytes, svg_text
+from rigsight.plan import Named, Sizes, use_of
+from rigsight.plan.experiments import read_limits, read_payloads
+from rigsight.plan.planning import Plan, plan_experiment
+from rigsight.plot import png_bytes, svg_text
+from rigsight.plot.signals import planned_experiment
 from rigsight.report.plan import render_plan
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.in_memory import campaign_of_rig, is_rig_file

@@ -13,13 +13,19 @@ import numpy as np
 from rigsight.effects import Effect
 from rigsight.errors import InputError, nearest
 from rigsight.identify import GreyBoxFit, characteristic_scales
-from rigsight.records import ColumnMapping, Record, read_record
+from rigsight.records import ColumnMapping, Floats, Record, read_record
 from rigsight.records.read_record import TIME
-from rigsight.records.record import Floats
 from rigsight.rigs import Rig
-from rigsight.simulate import Structure, parameter_vector, record_input, record_values, rest_state, simulate
-from rigsight.simulate.equations.composition import without_vanished_effects
-from rigsight.simulate.model import Model
+from rigsight.simulate import (
+    Model,
+    Structure,
+    parameter_vector,
+    record_input,
+    record_values,
+    rest_state,
+    simulate,
+    without_vanished_effects,
+)
 from rigsight.workflow.campaign.campaign_file import Where, checked_numbers
 from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
 from rigsight.workflow.campaign.read_campaign import options_of

@@ -22,10 +22,8 @@ from rigsight.plot import png_bytes, svg_text
 from rigsight.plot.frequency_responses import varied_responses
 from rigsight.records import Record
 from rigsight.rigs import Rig
-from rigsight.simulate import Structure, simulate
-from rigsight.simulate.equations.composition import without_vanished_effects
+from rigsight.simulate import Model, Structure, simulate, without_vanished_effects
 from rigsight.simulate.linearization import is_linear, linearize
-from rigsight.simulate.model import Model
 from rigsight.units import behind
 from rigsight.workflow.campaign.model_file import named_model
 from rigsight.workflow.run.kernels import prepare_kernels

@@ -15,7 +15,8 @@ from rigsight.effects import effect_named, placed
 from rigsight.errors import InputError
 from rigsight.identify.rig_equations import equations_of
 from rigsight.records.record import Hold, Record
-from rigsight.rigs import RIGS, Rig, has_short_inverse, mechanism, rig_of_tables
+from rigsight.rigs import RIGS, Rig, has_short_inverse, mechanism
+from rigsight.rigs.reading.rig_file import rig_of_tables
 from rigsight.simulate import (
     Structure,
     carries_tangents,

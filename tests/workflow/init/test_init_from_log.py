@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rigsight.records.channel_table import read_columns
 from rigsight.records.formats.channel import Channel, TimeAxis
-from rigsight.robots import draft_rig
+from rigsight.robots.draft import draft_rig
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.campaign.signal_guesses import guess_file
 from rigsight.workflow.init import run_init, run_init_from_mjcf

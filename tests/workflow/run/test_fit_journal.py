@@ -20,13 +20,29 @@ CANDIDATES = [effect_named(name) for name in ("cubic_stiffness", "coulomb_fricti
 def counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Fits that were recalled, one entry per diagnosis that ended."""
     seen: list[int] = []
-    leave = FitJournal.__exit__
+    own: set[str] = set()
+    recalled: set[str] = set()
+    recall, remember, leave = FitJournal.recall, FitJournal.remember, FitJournal.__exit__
 
-    def noted(self: FitJournal, kind, error, trace) -> None:
-        seen.append(self.recalled)
+    def noted_recall(self: FitJournal, key: str):
+        found = recall(self, key)
+        if found is not None and key not in own:
+            recalled.add(key)
+        return found
+
+    def noted_remember(self: FitJournal, key: str, outcome) -> None:
+        own.add(key)
+        remember(self, key, outcome)
+
+    def noted_exit(self: FitJournal, kind, error, trace) -> None:
+        seen.append(len(recalled))
+        own.clear()
+        recalled.clear()
         leave(self, kind, error, trace)
 
-    monkeypatch.setattr(FitJournal, "__exit__", noted)
+    monkeypatch.setattr(FitJournal, "recall", noted_recall)
+    monkeypatch.setattr(FitJournal, "remember", noted_remember)
+    monkeypatch.setattr(FitJournal, "__exit__", noted_exit)
     return seen
 
 

@@ -9,7 +9,8 @@ from typing import Any
 
 from rigsight.effects import AT, family_of
 from rigsight.errors import InputError
-from rigsight.rigs import Rig, declared_rig
+from rigsight.rigs import Rig
+from rigsight.rigs.built_in import declared_rig
 from rigsight_bench.scoring.parameter_errors import ParameterError, parameter_errors
 from rigsight_bench.scoring.trial_outcome import FAILED, Outcome, WithheldError
 from rigsight_bench.trials.kinds import SEVERAL, TIERS

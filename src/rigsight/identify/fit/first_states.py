@@ -97,10 +97,8 @@ def _rig_state(
     moving: Sequence[str],
     pull: float,
 ) -> Floats:
-    """Return the state that agrees best with the readings of all sensors, and with the slopes of those that are `moving`.
-
-    `pull` is the weight of the equilibrium, for states that the sensors do not show.
-    """
+    """Return the state that agrees best with the readings of all sensors, and with the slopes of those that are `moving`."""
+    # `pull` is the weight of the equilibrium, for states that the sensors do not show.
     p = equations.parameters(values, record)
     u = equations.inputs_of(record.slice(0, min(record.n_samples, _FIRST_SAMPLES)))[1][:, :1]
     begin = declared_start(equations.structure, p)

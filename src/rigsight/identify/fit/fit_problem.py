@@ -22,11 +22,11 @@ from rigsight.simulate import (
     FittedRecord,
     Substeps,
     carries_tangents,
-    choose_substeps,
     differs_at_events,
     kernel_of,
     simulate_tangents,
 )
+from rigsight.simulate.side_by_side import choose_substeps
 
 MOST_SUBSTEPS = 16
 """Largest number of substeps; a model that is too stiff for it is fitted with this number, and its residuals are recomputed

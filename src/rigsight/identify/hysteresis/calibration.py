@@ -33,6 +33,8 @@ RELEASE_GAIN = 1.01
 """Factor by which releasing a special value (an exponent of 1) must lower the cost for other starts to be tried."""
 BEYOND = 2.0
 """Factor of the special value that gives the other start."""
+_SPREAD = 10.0
+"""Factor around their start values within which the parameters of the rig are searched."""
 _SUBSTEPS = 2
 _ROUGH_EVALUATIONS = 40
 _ROUGH_TOLERANCE = 1e-3
@@ -88,7 +90,6 @@ def calibrate_to_records(
     start: Mapping[str, float] | None = None,
     free: Sequence[str] | None = None,
     output_noise: Mapping[str, float] | None = None,
-    spread: float = 10.0,
     n_generations: int = 100,
     n_sets: int = 96,
     n_ends: int = 8,
@@ -98,7 +99,7 @@ def calibrate_to_records(
     """Calibrate a structure with hysteresis to records, best at several amplitudes below and above saturation.
 
     Values written into the equations as numbers are kept. Start values of the rig that are missing are estimated from the
-    spectra, and its parameters are searched within a factor `spread` around them; effects need none, because their whole
+    spectra, and its parameters are searched within a factor of 10 around them; effects need none, because their whole
     declared range is searched. By default all parameters that the records can determine are free, and residuals are divided
     by 1 % of the size of an output; if one output is fitted, standard errors do not depend on it, because they follow from
     the residuals. The result does not depend on `n_jobs`, the number of records simulated at the same time.
@@ -129,7 +130,7 @@ def calibrate_to_records(
     shifts = {p.name for p in rig.parameters} - numbers_of_motion(rig)
     searched = tuple(name for name in simple_free if name not in shifts)
     coordinates = Coordinates.of(simple, searched, begin, scales)
-    box = SearchBox.around(coordinates, coordinates.from_values(begin), spread)
+    box = SearchBox.around(coordinates, coordinates.from_values(begin))
     ends = search(
         lambda thetas: _costs(look, coordinates, thetas),
         box,
@@ -299,18 +300,14 @@ def declared_starts(
 
 @dataclass(frozen=True, eq=False)
 class SearchBox:
-    """Maps the unit cube to search coordinates.
-
-    Ranges in characteristic units are spaced by their inverse hyperbolic sine: evenly up to a tenth of a unit, by decades
-    beyond.
-    """
+    """Maps the unit cube to search coordinates: evenly up to a tenth of a characteristic unit, by decades beyond (arsinh)."""
 
     # Range of each coordinate, shape (n_free,).
     lower: Floats
     upper: Floats
 
     @classmethod
-    def around(cls, coordinates: Coordinates, center: Floats, spread: float) -> SearchBox:
+    def around(cls, coordinates: Coordinates, center: Floats) -> SearchBox:
         """Take the declared range of a parameter if it has one, else a range around `center`."""
         structure = coordinates.structure
         of_rig = {p.name for p in structure.rig.parameters}
@@ -318,14 +315,14 @@ class SearchBox:
         for i, name in enumerate(coordinates.free):
             if name not in of_rig:
                 continue
-            reach = np.log(spread) if coordinates.logarithmic[i] else spread * max(1.0, abs(center[i]))
+            reach = np.log(_SPREAD) if coordinates.logarithmic[i] else _SPREAD * max(1.0, abs(center[i]))
             lower[i], upper[i] = max(lower[i], center[i] - reach), min(upper[i], center[i] + reach)
         split = coordinates.split
         if split is not None:
             # Both are parts of one stiffness, and only the total is known from the start.
             whole = np.exp(center[split.stiffness]) + center[split.share]
-            lower[split.stiffness], upper[split.stiffness] = np.log(whole / spread), np.log(whole * spread)
-            lower[split.share], upper[split.share] = 0.0, whole * spread
+            lower[split.stiffness], upper[split.stiffness] = np.log(whole / _SPREAD), np.log(whole * _SPREAD)
+            lower[split.share], upper[split.share] = 0.0, whole * _SPREAD
         return cls(lower, upper)
 
     def coordinates(self, places: Floats) -> Floats:
@@ -381,9 +378,7 @@ def search(
     kept = _different(places, costs, n_ends)
     usable = [place for place in kept if costs[place] < _UNUSABLE]
     if not usable:
-        raise InputError(
-            "No parameter set in the search range can be simulated. Give better start values or a smaller spread."
-        )
+        raise InputError("No parameter set in the search range can be simulated. Give better start values.")
     return box.coordinates(places[usable])
 
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import sympy as sp
 
+from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
-from rigsight.effects.effect import Effect
 from rigsight.errors import InputError
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.covariance import symmetric_eigen
@@ -68,14 +68,10 @@ def derived_quantities(
     amplitudes: Sequence[float],
     scales: Mapping[str, float],
     rng: np.random.Generator,
-    n_draws: int = _DRAWS,
 ) -> DerivedQuantities:
-    """Derive pairs, saturation, and loop areas at some deflections (such as `record_amplitudes`) from a fit with its covariance.
-
-    The scales are those of the fit; the parameters are drawn `n_draws` times.
-    """
+    """Derive pairs, saturation, and loop areas at some deflections, as of `record_amplitudes`, from a fit with its covariance."""
     structure = fit.structure
-    draws = parameter_draws(fit, scales, rng, n_draws)
+    draws = parameter_draws(fit, scales, rng, _DRAWS)
     determined = _determined(fit)
     known = dict(structure.fixed)
 

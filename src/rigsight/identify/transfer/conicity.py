@@ -38,15 +38,12 @@ class ConicityEstimate:
     standard_error: float  # of the unbounded value [rad], by the delta method
     # Confidence interval inside the limits [rad]; None if no admissible conicity is compatible with c_y.
     interval: tuple[float, float] | None
-    level: float  # its confidence level
     # True if the interval excludes zero and is narrower than the range of plausible conicities.
     determined: bool
     statement: str  # the result in one or two sentences
 
 
-def estimate_conicity(
-    c_y: float, standard_error: float, r_0: float, b: float, level: float = LEVEL
-) -> ConicityEstimate:
+def estimate_conicity(c_y: float, standard_error: float, r_0: float, b: float) -> ConicityEstimate:
     """Return delta_0 from the creep factor, limited to positive values, with its interval.
 
     The interval maps the normal interval of c_y through (2.12), which is monotonic between the limits: near a limit it is exact,
@@ -58,21 +55,18 @@ def estimate_conicity(
         Creep factor and its standard error (may be infinite).
     r_0, b
         Wheel radius and track width [m].
-    level
-        Confidence level.
 
     Raises
     ------
     InputError
-        If c_y is not positive, its error negative, or the level not between 0 and 1.
+        If c_y is not positive, or its error negative.
     """
-    if not (c_y > 0.0 and standard_error >= 0.0 and 0.0 < level < 1.0):
+    if not (c_y > 0.0 and standard_error >= 0.0):
         raise InputError(
-            f"A conicity needs c_y above 0, its standard error at least 0 and a level between 0 and 1; got c_y = {c_y:g} "
-            f"+- {standard_error:g} at level {level:g}."
+            f"A conicity needs c_y above 0 and its standard error at least 0; got c_y = {c_y:g} +- {standard_error:g}."
         )
     largest = math.atan2(b, 2.0 * r_0)
-    width = float(norm.ppf(0.5 + 0.5 * level)) * standard_error
+    width = float(norm.ppf(0.5 + 0.5 * LEVEL)) * standard_error
     low_c, high_c = c_y - width, c_y + width
     top = -0.5 * math.atan(2.0 * r_0 / b)
     value = _bounded(c_y, largest, r_0, b)
@@ -80,7 +74,7 @@ def estimate_conicity(
     slope = abs(conicity_slope(value if unbounded is None else unbounded, r_0, b))
     # At the maximum of c_y its derivative is zero, and the delta method fails.
     error = standard_error / slope if unbounded is not None and slope > 0.0 else math.inf
-    percent = f"{100.0 * level:g} %"
+    percent = f"{100.0 * LEVEL:g} %"
     lower, upper = _bounded(high_c, largest, r_0, b), _bounded(low_c, largest, r_0, b)
     determined, text = False, f"{percent} interval {lower:.3g} to {upper:.3g} rad"
     if low_c >= 1.0:
@@ -104,7 +98,7 @@ def estimate_conicity(
                 " It differs from zero, but its interval is wider than the range of plausible conicities."
             )
     interval = None if low_c >= 1.0 else (lower, upper)
-    return ConicityEstimate(value, unbounded, error, interval, level, determined, statement)
+    return ConicityEstimate(value, unbounded, error, interval, determined, statement)
 
 
 def _bounded(c_y: float, largest: float, r_0: float, b: float) -> float:

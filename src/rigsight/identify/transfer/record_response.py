@@ -11,14 +11,13 @@ import numpy as np
 from rigsight.errors import InputError, check_option
 from rigsight.frequency import (
     FrequencyResponse,
-    PlainRatio,
     averaged_response,
     local_polynomial_response,
     local_rational_response,
-    plain_ratio,
     thesis_response,
 )
 from rigsight.frequency.signal_pair import excited, line_frequencies
+from rigsight.frequency.spectral import PlainRatio, plain_ratio
 from rigsight.identify.transfer.transfer_form import Order, TransferFit
 from rigsight.identify.transfer.transfer_function import MISFIT, fit_frequency_response
 from rigsight.records.record import Floats, Hold, Record
@@ -177,12 +176,12 @@ class _Local:
         return _smaller_variance(found, alone, np.maximum(spread, 0.0)), plain, fit
 
     def _estimated(self, record: Record, transient: bool, instrument: str | None) -> FrequencyResponse:
-        local = local_rational_response if self.method == "local_rational" else local_polynomial_response
         lines, *_ = self.resolved(instrument)
-        return local(
+        return local_polynomial_response(
             record,
             self.source,
             self.name,
+            poles=2 if self.method == "local_rational" else 0,
             bandwidth=self.resolution or lines * _line(record),
             transient=transient,
             hold=self.hold,

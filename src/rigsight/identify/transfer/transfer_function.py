@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rigsight.errors import InputError, check_option
-from rigsight.frequency import FrequencyResponse, PlainRatio, hold_response
+from rigsight.frequency import FrequencyResponse, hold_response
+from rigsight.frequency.spectral import PlainRatio
 from rigsight.identify.fit.covariance import propagated_covariance, sandwich_covariance
 from rigsight.identify.information import POORLY_KNOWN
 from rigsight.identify.transfer.transfer_form import Order, TransferFit, TransferForm

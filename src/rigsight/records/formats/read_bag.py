@@ -171,10 +171,8 @@ def _channels(
 def _in_order(
     stamps: Nanoseconds, received: Nanoseconds, values: Floats
 ) -> tuple[NDArray[np.intp], tuple[str, ...]]:
-    """Return the messages in the order of their stamps, each once, and what was done for that.
-
-    `values` have shape (n_channels, n_messages). Where the clock was set back they keep the order of their reception.
-    """
+    """Return the messages in the order of their stamps (of reception where the clock was set back), once, and what was done."""
+    # Values have the shape (n_channels, n_messages).
     order, notes, n_messages = np.arange(stamps.size), [], stamps.size
     latest = np.maximum.accumulate(stamps)
     behind = np.flatnonzero(stamps < latest)

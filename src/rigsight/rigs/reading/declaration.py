@@ -18,8 +18,7 @@ from rigsight.rigs.reading.expressions import (
     rate_name,
     to_sympy,
 )
-
-Path = tuple[str | int, ...]
+from rigsight.rigs.reading.toml_places import Path, nearest_place
 
 NAMED = ("inputs", "constants", "parameters", "alternatives", "coordinates", "states", "signals", "drives")
 """Tables whose names no two entries may share."""
@@ -178,18 +177,9 @@ class Declaration:
 
     def refuse(self, path: Path, message: str, within: int | None = None) -> NoReturn:
         """Raise a message with the place of a value, or of the nearest table around it."""
-        place, length = None, 0
-        for length in range(len(path), 0, -1):
-            own = path[:length]
-            # A table may have no header of its own, but one within it.
-            place = self._places.get(own) or next(
-                (inner for key, inner in self._places.items() if key[:length] == own), None
-            )
-            if place is not None:
-                break
-        where = self._source
+        where, (place, is_own) = self._source, nearest_place(path, self._places)
         if place is not None:
-            column = place[1] + (within + 1 if within is not None and len(path) == length else 0)
+            column = place[1] + (within + 1 if within is not None and is_own else 0)
             where += f", line {place[0]}, column {column}"
         named = f"{'.'.join(map(str, path))}: " if path else ""
         raise InputError(f"{where}: {named}{message}.")

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from rigsight.errors import nearest, shown
-from rigsight.rigs.reading.declaration import NAMED, Declaration, Path
+from rigsight.rigs.reading.declaration import NAMED, Declaration
 from rigsight.rigs.reading.expressions import FUNCTIONS, force_name, is_identifier, rate_name
+from rigsight.rigs.reading.toml_places import Path
 
 _LONGEST_NAME = 60
 _NUMBERS = "parameters and constants"

@@ -15,7 +15,7 @@ from typing import Any
 
 from lark import Token, Tree
 
-from rigsight.rigs.reading.declaration import Declaration, Path, quoted
+from rigsight.rigs.reading.declaration import Declaration, quoted
 from rigsight.rigs.reading.expressions import (
     FUNCTIONS,
     READS,
@@ -25,6 +25,7 @@ from rigsight.rigs.reading.expressions import (
     place_of,
     rate_name,
 )
+from rigsight.rigs.reading.toml_places import Path
 from rigsight.units import INPUT_UNIT
 
 Dimension = Any

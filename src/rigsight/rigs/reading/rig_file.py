@@ -70,22 +70,8 @@ def rig_of_text(
 
 
 def rig_of_tables(tables: Mapping[str, Any], source: str, *, check_units: bool = True) -> Rig:
-    """Return the rig that the tables of a file declare.
-
-    Parameters
-    ----------
-    tables
-        As `tomllib` returns them.
-    source
-        How messages call it.
-    check_units
-        Whether to check that units add up, which loads the library that knows them.
-
-    Raises
-    ------
-    InputError
-        Naming the table and key of what was wrong, and what to write instead.
-    """
+    """Return the rig that the tables of a file declare, as `tomllib` returns them."""
+    # A check of units loads the library that knows them.
     return _rig_of(tables, {}, source, check_units)
 
 

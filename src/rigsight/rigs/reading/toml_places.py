@@ -51,6 +51,17 @@ def value_places(text: str) -> dict[Path, Place]:
     return places
 
 
+def nearest_place(path: Path, places: Mapping[Path, Place]) -> tuple[Place | None, bool]:
+    """Return the place of a value, or of the nearest table around it, and whether it is that of the value itself."""
+    for length in range(len(path), 0, -1):
+        own = path[:length]
+        # A table may have no header of its own, but one within it.
+        place = places.get(own) or next((at for key, at in places.items() if key[:length] == own), None)
+        if place is not None:
+            return place, length == len(path)
+    return None, False
+
+
 def _within_lists(keys: Path, lists: Mapping[Path, int]) -> Path:
     """Return the keys of a header with the number of the list's last element behind each list that they lead through."""
     path: Path = ()

@@ -198,10 +198,8 @@ def _frictions(
 
 
 def is_zero(expression: sp.Expr) -> bool:
-    """Return True for an expression that is zero at an arbitrary point, because simplification by sympy would take seconds.
-
-    Numbers are put in first: `evalf` with `subs` refines each nested sum that cancels, and takes minutes.
-    """
+    """Return True for an expression that is zero at an arbitrary point, because simplification by sympy would take seconds."""
+    # Numbers are put in first: `evalf` with `subs` refines each nested sum that cancels, and takes minutes.
     expression = _of_sympy(expression)
     value = _number(expression, _arbitrary_place(expression.free_symbols))
     return bool(abs(value) < _ROUNDED) if value.is_number else False

@@ -282,7 +282,7 @@ def function_body(
     targets: Sequence[str],
     expressions: Sequence[sp.Expr],
     names: Mapping[sp.Symbol, str],
-    *further: str,
+    *,
     lanes: bool = False,
     steps: Mapping[sp.Symbol, sp.Expr] = _NO_STEPS,
 ) -> str:
@@ -294,16 +294,16 @@ def function_body(
             f"The symbol {symbol} has no number: names of rigs and effects must not appear in C code."
         )
     lines = (C_LANES if lanes else C).statements(targets, expressions, names, needed) if targets else []
-    return _marked(arguments, lines, further)
+    return _marked(arguments, lines)
 
 
 def lane_body(targets: Sequence[str], line: StraightLine, names: Mapping[sp.Symbol, str]) -> str:
     """Return the body of a function of vector lanes that computes expressions in parts."""
-    return _marked((), C_LANES.written(targets, line, names), ())
+    return _marked((), C_LANES.written(targets, line, names))
 
 
-def _marked(arguments: Sequence[str], lines: Sequence[str], further: Sequence[str]) -> str:
-    text = "\n".join([*lines, *further])
+def _marked(arguments: Sequence[str], lines: Sequence[str]) -> str:
+    text = "\n".join(lines)
     unread = [a for a in arguments if f"{a}[" not in text and f"{a}->" not in text]
     marks = [" ".join(f"(void){argument};" for argument in unread)] if unread else []
-    return "\n".join(f"    {line}" for line in [*marks, *lines, *further])
+    return "\n".join(f"    {line}" for line in [*marks, *lines])

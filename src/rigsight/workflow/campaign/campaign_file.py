@@ -15,7 +15,7 @@ from rigsight.parameters import Parameter
 from rigsight.records import Hold, Kind, Role
 from rigsight.records.formats.known import MEASURED_SUFFIXES
 from rigsight.rigs import Rig
-from rigsight.rigs.reading.toml_places import Place, toml_tables, value_places
+from rigsight.rigs.reading.toml_places import Place, nearest_place, toml_tables, value_places
 from rigsight.simulate import Structure, compose
 from rigsight.workflow.own.own_rigs import text_of
 
@@ -249,7 +249,9 @@ class Where:
 
     def at(self, *location: str | int) -> str:
         """Return the beginning of a message: ``campaign.toml, line 7, column 5: rig.constants.v``."""
-        return f"{self.name}{self._place(location)}: {self.called(location)}"
+        place, _ = nearest_place(location, self.places)
+        where = self.name if place is None else f"{self.name}, line {place[0]}, column {place[1]}"
+        return f"{where}: {self.called(location)}"
 
     def called(self, location: Location) -> str:
         """Return a location as text: ``rig.constants.v``, ``record 2 (step.csv): role``."""
@@ -263,17 +265,6 @@ class Where:
         record = f"record {location[1] + 1}" + (f" ({file})" if isinstance(file, str) and file else "")
         rest = ".".join(map(str, location[2:]))
         return f"{record}: {rest}" if rest else record
-
-    def _place(self, location: Location) -> str:
-        """Return the line of a key; for a missing key, the line of its table."""
-        for length in range(len(location), 0, -1):
-            own = location[:length]
-            place = self.places.get(own) or next(
-                (inner for key, inner in self.places.items() if key[:length] == own), None
-            )
-            if place is not None:
-                return f", line {place[0]}, column {place[1]}"
-        return ""
 
 
 def rig_named(where: Where, name: str, known: Mapping[str, Rig]) -> Rig:

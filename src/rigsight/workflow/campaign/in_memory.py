@@ -17,13 +17,11 @@ from rigsight.campaign import Campaign
 from rigsight.effects import Effect, effect_named
 from rigsight.errors import InputError, SimulationError, check_option
 from rigsight.excitation import linear_sweep, log_sweep
-from rigsight.parameters import ParameterSet
-from rigsight.records import Hold, Record, Role
-from rigsight.records.signals import is_constant
+from rigsight.parameters import complete_values
+from rigsight.records import Hold, Record, Role, is_constant
 from rigsight.rigs import RIGS, Rig, read_rig_file, rig_of_tables, rotational
-from rigsight.simulate import compose, simulate
+from rigsight.simulate import Model, compose, simulate
 from rigsight.simulate.linearization import linearize
-from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.campaign_file import Offsets, Where, checked_numbers, checked_simulation
 from rigsight.workflow.campaign.read_campaign import campaign_of_records, check_roles, read_campaign
 from rigsight.workflow.campaign.record_notes import in_units_of, rig_in_units_of
@@ -170,9 +168,7 @@ def make_model(
     """
     found = rig_of(rig)
     structure = compose(found, effects_on(found, effects_of(effects), found.name))
-    defaults = {p.name: p.default for p in structure.parameters if p.default is not None}
-    complete = ParameterSet.from_mapping(structure.parameters, {**defaults, **values})
-    return Model(structure, complete.to_mapping(), hold)
+    return Model(structure, complete_values(structure.parameters, values), hold)
 
 
 def rig_of(rig: str | Rig) -> Rig:

@@ -14,7 +14,8 @@ from rigsight.discover.terms import known_terms
 from rigsight.effects import Effect, effect_named, kind_of
 from rigsight.errors import InputError, nearest, shown
 from rigsight.records import Hold
-from rigsight.rigs import Rig, declared_rig
+from rigsight.rigs import Rig
+from rigsight.rigs.built_in import declared_rig
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import Structure, compose, structure_named
 from rigsight.simulate.model import SCHEMA_VERSION, Model

@@ -9,10 +9,8 @@ from itertools import combinations
 import numpy as np
 
 from rigsight.errors import InputError
-from rigsight.records import Record
+from rigsight.records import Floats, Record, is_constant
 from rigsight.records.channel_units import UnknownUnitError, conversion, has_si, is_a
-from rigsight.records.record import Floats
-from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig, rotational
 
 _SEGMENTS = 8

@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import label, maximum_filter1d, minimum_filter1d
 
 from rigsight.errors import InputError
-from rigsight.records import Kind, Role
+from rigsight.records import Floats, Kind, Role
 from rigsight.records.channel_units import UnknownUnitError, factor, has_si, in_drive_unit, is_a
 from rigsight.records.clocks import increases, is_time
 from rigsight.records.formats.channel import Channel, ChannelFile, as_floats, as_stamps
 from rigsight.records.formats.known import LOGS
 from rigsight.records.read_record import TIME
-from rigsight.records.record import Floats
 from rigsight.records.signals import repeated_period
 from rigsight.records.stamps import step_and_gaps
 from rigsight.rigs import Rig

@@ -77,10 +77,8 @@ def distinguishing(rig: Rig) -> tuple[str, ...]:
 def guess_file(
     channels: Sequence[Channel], rigs: Iterable[Rig], rising: Channel | None = None, *, is_log: bool = False
 ) -> FileGuess:
-    """Return the rig that matches the channels best, with the channel of each signal.
-
-    In the log of a robot commands and readings have groups that are called so.
-    """
+    """Return the rig that matches the channels best, with the channel of each signal."""
+    # In the log of a robot commands and readings have groups that are called so.
     rise = [
         number
         for number, channel in enumerate(channels)

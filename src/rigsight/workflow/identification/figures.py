@@ -21,8 +21,8 @@ from rigsight.plot import (
     overlaid_responses,
     response_grid,
     svg_text,
+    with_unit,
 )
-from rigsight.plot.drawing import with_unit
 from rigsight.units import behind
 
 if TYPE_CHECKING:

@@ -18,8 +18,7 @@ from rigsight.metrics import rms
 from rigsight.records import Record
 from rigsight.report.labels import gap_percent
 from rigsight.rigs import Rig
-from rigsight.simulate import Structure, compose
-from rigsight.simulate.model import Model
+from rigsight.simulate import Model, Structure, compose
 from rigsight.workflow.identification.joint import errors_by_output
 from rigsight.workflow.run.kernels import prepare_kernels
 from rigsight.workflow.run.progress import Listener, Stage, Step

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from operator import attrgetter
 
 import numpy as np
 
 from rigsight.campaign import Campaign
-from rigsight.identify import GreyBoxFit, characteristic_scales, estimate_conicity, fit_jointly
+from rigsight.identify import GreyBoxFit, PhysicalEstimates, characteristic_scales, estimate_conicity
 from rigsight.identify.amplitude_dependence import measured_amplitude
 from rigsight.identify.fit.windows import cut
 from rigsight.identify.identification import JointIdentification, RecordIdentification, RecordScore
-from rigsight.identify.joint import JointFit
-from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
+from rigsight.identify.joint import JointFit, fit_jointly
 from rigsight.identify.transfer.transfer_function import MISFIT
 from rigsight.metrics import nrmse
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 from rigsight.records.signals import roughness
 from rigsight.report.labels import gap_percent, sentence_case
 from rigsight.simulate import Structure
@@ -28,7 +25,6 @@ _DIFFERENT = 0.01
 _SMALL_LOSS = 0.01
 UNSERVED = 0.9
 """NRMSE from which a fit does not follow a motion at all."""
-_ORIGIN = attrgetter("origin")
 _BELOW = 1e-6
 
 
@@ -43,11 +39,11 @@ def identify_jointly(
     """Fit one set of parameters to all estimation records, and one to each; score every record."""
     records = [r.record for r in found]
     windows = cut(records, length)
-    fit = fit_jointly(structure, windows, campaign.constants, known, start, group_of=_ORIGIN)
+    fit = fit_jointly(structure, windows, campaign.constants, known, start)
     pooled = _pooled(found, known) if fit.probability < _DIFFERENT else None
     if pooled is not None:
         held, noise, values = {**known, **pooled.values}, fit.noise, fit.fit.values
-        fit = fit_jointly(structure, windows, campaign.constants, held, values, noise, group_of=_ORIGIN)
+        fit = fit_jointly(structure, windows, campaign.constants, held, values, noise)
     amplitudes = {r.record.name: r.amplitude for r in found}
     scores = (
         *_estimation_scores(fit, windows, amplitudes),

@@ -41,9 +41,8 @@ from rigsight.identify.record_identification import EstimationOptions, identify_
 from rigsight.identify.transfer.physical_parameters import PhysicalEstimates, form_gives_parameters
 from rigsight.records import Record
 from rigsight.rigs import Rig
-from rigsight.simulate import Structure, compose
+from rigsight.simulate import Model, Structure, compose
 from rigsight.simulate.linearization import Linearization
-from rigsight.simulate.model import Model
 from rigsight.workflow.identification.joint import UNSERVED, held_parameters, identify_jointly
 from rigsight.workflow.identification.start_with_effects import start_with_effects
 from rigsight.workflow.identification.warnings import (

@@ -14,8 +14,7 @@ from rigsight.effects import Effect, Energy, Place
 from rigsight.errors import SimulationError
 from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
-from rigsight.records import Record
-from rigsight.records.record import Floats
+from rigsight.records import Floats, Record
 from rigsight.rigs import joint_of
 from rigsight.simulate import compose, simulate
 from rigsight.units import characteristic_value

@@ -15,15 +15,7 @@ _NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*")
 
 
 def effect_file(about: str, effects: Mapping[str, Effect]) -> str:
-    """Return the text of a Python file that declares forces at joints.
-
-    Parameters
-    ----------
-    about
-        What the file declares, in a sentence.
-    effects
-        Force as Python text -> the effect that resists with it, without states or place.
-    """
+    """Return the text of a Python file that declares forces at joints: as Python text -> the effect that resists with each."""
     parts = template_parts("workflow", "effects.py.txt")
     numbers = list(dict.fromkeys(p.name for effect in effects.values() for p in effect.parameters))
     read = {name for force in effects for name in _NAME.findall(force)} - {*numbers}

@@ -14,12 +14,10 @@ from rigsight.excitation import log_sweep
 from rigsight.identify.hysteresis import SpectralRatio
 from rigsight.records import Record
 from rigsight.rigs import evaluated
-from rigsight.simulate import parameter_vector, rest_state
-from rigsight.simulate.equations.composition import without_vanished_effects
+from rigsight.simulate import Model, parameter_vector, rest_state, without_vanished_effects
 from rigsight.simulate.equations.straight_line import straight_line
 from rigsight.simulate.equations.structure import TIME, input_symbols
 from rigsight.simulate.input_hold import hold_input, together
-from rigsight.simulate.model import Model
 
 MARGIN = (0.5, 1.6)
 """Factors by which the sweep reaches beyond the band."""

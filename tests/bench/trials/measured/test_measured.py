@@ -14,7 +14,8 @@ from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, effect_named, family_of, placed
 from rigsight.errors import InputError, SimulationError
 from rigsight.records import Record
-from rigsight.rigs import AXIS, ELEMENT, rig_of_tables
+from rigsight.rigs import AXIS, ELEMENT
+from rigsight.rigs.reading.rig_file import rig_of_tables
 from rigsight.simulate import compose, simulate
 from rigsight.workflow.campaign.in_memory import make_campaign
 from rigsight.workflow.campaign.read_campaign import read_campaign

@@ -16,7 +16,8 @@ import numpy as np
 import sympy as sp
 
 from rigsight.errors import SimulationError
-from rigsight.rigs import RIGS, Rig, declared_rig
+from rigsight.rigs import RIGS, Rig
+from rigsight.rigs.built_in import declared_rig
 from rigsight.simulate import compose
 from rigsight.simulate.linearization import linearize
 from rigsight_bench.trials.any_rig_numbers import draw_numbers
