@@ -52,9 +52,9 @@ class Sums:
 
     def solved(self, chosen: Sequence[int]) -> Floats:
         """Return the numbers of the equations and of chosen columns, shape (n,); 1 for a given force."""
-        columns = [*self.own, *chosen]
-        found = np.ones(len(columns))
-        free = np.array([column not in self.given for column in columns])
+        columns = np.array([*self.own, *chosen], dtype=np.int64)
+        found = np.ones(columns.size)
+        free = np.array([column not in self.given for column in columns], dtype=np.bool_)
         found[free] = _numbers(self.system(chosen), self.n_rows) / self.size[columns][free]
         return found
 
