@@ -10,7 +10,7 @@ import pytest
 from rigsight.effects import effect_named, placed
 from rigsight.errors import InputError
 from rigsight.records.record import Record
-from rigsight.rigs import Rig, read_rig_file
+from rigsight.rigs import RIGS, Rig, read_rig_file
 from rigsight.simulate import compose, parameter_vector, record_input, rest_state, simulate, simulate_sets
 
 DT, N = 5e-3, 200
@@ -114,3 +114,26 @@ def test_what_friction_holds_decays_without_any_input(tmp_path: Path) -> None:
     state = rest_state(structure, p, held)
     sets = simulate_sets(structure, held, p[:, None], state[:, None], N, 8)[:, 0, 0]
     np.testing.assert_allclose(sets, found, atol=1e-5)
+
+
+def test_what_was_before_a_record_moves_a_rig_of_two_inputs() -> None:
+    values = dict(zip(("l_1", "g", "I_1", "I_2", "m_2", "s_1", "s_2", "d_1", "d_2"),
+                      (0.3, 9.81, 0.05, 0.02, 0.6, 0.12, 0.08, 0.05, 0.02), strict=True))  # fmt: skip
+    whole = {"tau_1": 0.5 * np.sin(9.0 * T), "tau_2": 0.2 * np.sin(14.0 * T)}
+    structure, split = compose(RIGS["two_link_arm"]), 80
+    complete = simulate(structure, values, Record("run", DT, whole, {}, hold="foh"))
+    second = Record("run", DT, {name: samples[split:] for name, samples in whole.items()}, {}, hold="foh")
+    columns = np.column_stack([samples[:split] for samples in whole.values()])
+    for before in (columns, {name: samples[:split] for name, samples in whole.items()}):
+        found = simulate(structure, values, second, before=before)
+        np.testing.assert_allclose(found["angle_2"], complete["angle_2"][split:], rtol=1e-7, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "before",
+    [np.zeros(9), np.zeros((9, 3)), {"tau_1": np.zeros(9)}, {"tau_1": np.zeros(9), "tau_2": np.zeros(8)}],
+)
+def test_samples_before_a_record_are_of_each_input(before: object) -> None:
+    record = Record("run", DT, {"tau_1": np.zeros(N), "tau_2": np.zeros(N)}, {}, hold="foh")
+    with pytest.raises(InputError, match="two_link_arm has the inputs tau_1, tau_2"):
+        simulate(compose(RIGS["two_link_arm"]), {}, record, before=before)  # type: ignore[arg-type]

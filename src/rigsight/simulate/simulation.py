@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +67,7 @@ def simulate(
     record: Record,
     initial_state: Floats | None = None,
     accuracy: float = DEFAULT_ACCURACY,
+    before: Floats | Mapping[str, Floats] | None = None,
 ) -> Record:
     """Simulate a record's input and return the outputs as a record of the same form.
 
@@ -81,12 +83,28 @@ def simulate(
         Shape (n_states,), in the order of ``structure.states``; default is the static equilibrium at the first input sample.
     accuracy
         Relative RMS error to aim for.
+    before
+        Input samples (or the prescribed displacement) just before the record at its sample time, which set the memory of
+        hysteresis, friction and delays. Shape (n_before, n_inputs) in the order of the rig's inputs, (n_before,) for a rig with
+        one input, or the samples of each input by its name. The initial state is then that at the first of them.
 
     Raises
     ------
+    InputError
+        If `before` does not contain samples of each of the rig's inputs.
     SimulationError
         If the motion diverges or the model is too stiff.
     """
+    if before is not None:
+        earlier = _before(structure, before)
+        n_before = next(iter(earlier.values())).size
+        if n_before == 0:
+            return simulate(structure, values, record, initial_state, accuracy)
+        signals = {name: np.concatenate([samples, record[name]]) for name, samples in earlier.items()}
+        longer = replace(record, signals=signals, t0=record.t0 - n_before * record.dt)
+        whole = simulate(structure, values, longer, initial_state, accuracy)
+        names = [signal.name for signal in structure.rig.outputs]
+        return record.with_signals(**{name: whole[name][n_before:] for name in names})
     complete = structure
     structure, values = without_vanished_effects(complete, record_values(complete, values, record))
     held = record_input(structure, record)
@@ -100,6 +118,30 @@ def simulate(
     outputs = simulate_outputs(structure, held, p, initial_state, record.n_samples, accuracy)
     names = [signal.name for signal in structure.rig.outputs]
     return record.with_signals(**{name: outputs[:, i] for i, name in enumerate(names)})
+
+
+def _before(structure: Structure, before: Floats | Mapping[str, Floats]) -> dict[str, Floats]:
+    """Return the samples of each input before the record, by its name."""
+    inputs = [signal.name for signal in structure.rig.inputs]
+    if not inputs:
+        raise InputError(
+            f"'before' contains samples of inputs, but {structure.rig.name} has none. Give its initial state instead."
+        )
+    wanted = f"{structure.rig.name} has the inputs {', '.join(inputs)}"
+    if isinstance(before, Mapping):
+        if set(before) != set(inputs):
+            raise InputError(f"'before' has samples of {', '.join(before) or 'nothing'}; {wanted}.")
+        columns = [np.asarray(before[name], dtype=np.float64) for name in inputs]
+    else:
+        samples = np.asarray(before, dtype=np.float64)
+        columns = list((samples[:, None] if samples.ndim == 1 else samples).T)
+    shapes = {column.shape for column in columns}
+    if len(columns) != len(inputs) or len(shapes) != 1 or len(next(iter(shapes))) != 1:
+        raise InputError(
+            f"'before' has the shape {np.shape(before) if not isinstance(before, Mapping) else sorted(shapes)}; {wanted}: "
+            f"give (n_before, {len(inputs)}) samples, or as many of each by its name."
+        )
+    return dict(zip(inputs, columns, strict=True))
 
 
 def record_values(structure: Structure, values: Mapping[str, float], record: Record) -> dict[str, float]:
