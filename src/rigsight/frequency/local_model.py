@@ -58,7 +58,7 @@ class _LocalModel:
         return 2 * self.half + 1
 
 
-def local_polynomial_response(
+def local_response(
     record: Record,
     source: str,
     response: str,
@@ -72,9 +72,10 @@ def local_polynomial_response(
     wanted: Floats | None = None,
     instrument: str | None = None,
 ) -> FrequencyResponse:
-    """Return the frequency response with a polynomial of the frequency fitted around each line.
+    """Return the frequency response with a function of the frequency fitted around each line.
 
-    ``Y(k + r) = G(r) U(k + r) + T(r)`` with polynomials ``G`` and ``T`` of degree `order`.
+    ``A(r) Y(k + r) = B(r) U(k + r) + T(r)`` with polynomials ``B`` and ``T`` of degree `order`, ``A`` of degree `poles` and
+    ``A(0) = 1``. With poles a resonance narrower than the band is followed, where a polynomial cuts its peak.
 
     Parameters
     ----------
@@ -83,9 +84,9 @@ def local_polynomial_response(
     source, response
         Names of the signals.
     order
-        Degree of the polynomials.
+        Degree of the numerators.
     poles
-        Degree of a common denominator, as of `local_rational_response`.
+        Degree of the common denominator; 0 for a polynomial.
     bandwidth
         Width of the band around each line [rad/s]; None takes the narrowest that leaves six degrees of freedom. Wider
         bands lower the variance and raise the bias.
@@ -120,6 +121,10 @@ def local_polynomial_response(
     A sweep that begins with the record has, at its first frequencies, a spectrum as smooth as a transient's; the two cannot
     be distinguished there and the variance is large. Some seconds of rest before the sweep avoid this. With rest after it as
     well, ``transient=False`` is better still; without rest it is biased, and its variance does not show the bias.
+
+    With poles the response is on both sides of the equation, so large noise biases the estimate: below a signal-to-noise ratio of
+    about 30 dB the variance is 10 to 30 % too small, and below 20 dB the polynomial is better. Where the beginning of a sweep and
+    the transient cannot be distinguished, the variance may be several times too small.
     """
     method = "local rational" if poles else "local polynomial"
     if order < 0:
@@ -194,14 +199,8 @@ def local_polynomial_response(
     ).at(kept)
 
 
-local_rational_response = partial(local_polynomial_response, poles=2)
-"""The frequency response with a rational function of the frequency fitted around each line; see `local_polynomial_response`.
-
-``A(r) Y(k + r) = B(r) U(k + r) + T(r)`` with ``A(0) = 1``: a resonance narrower than the band is followed, where a polynomial
-cuts its peak. The response is on both sides of the equation, so large noise biases the estimate: below a signal-to-noise ratio
-of about 30 dB the variance is 10 to 30 % too small, and below 20 dB the local polynomial is better. Where the beginning of a
-sweep and the transient cannot be distinguished, the variance may be several times too small.
-"""
+local_polynomial_response = partial(local_response, poles=0)
+local_rational_response = partial(local_response, poles=2)
 
 
 class LocalFit:

@@ -177,11 +177,11 @@ class _Local:
 
     def _estimated(self, record: Record, transient: bool, instrument: str | None) -> FrequencyResponse:
         lines, *_ = self.resolved(instrument)
-        return local_polynomial_response(
+        estimate = local_rational_response if self.method == "local_rational" else local_polynomial_response
+        return estimate(
             record,
             self.source,
             self.name,
-            poles=2 if self.method == "local_rational" else 0,
             bandwidth=self.resolution or lines * _line(record),
             transient=transient,
             hold=self.hold,
