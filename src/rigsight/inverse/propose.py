@@ -126,7 +126,9 @@ def hidden_effects(
 def selection_of(
     terms_of: EffectTerms, effects: Sequence[Effect], noise: Floats | None = None
 ) -> Selection | None:
-    """Return the selection among effects, with tones at the lines of what the others leave; None where no effect is a term.
+    """Return the selection among effects; None where no effect is a term.
+
+    Tones stand at the lines of two residuals: that of the equations alone, and that beside the effects selected without tones.
 
     Parameters
     ----------
@@ -142,17 +144,17 @@ def selection_of(
     if not terms:
         return None
     selection = _with_finer_grid(Selection(fit, values, terms, noise), terms_of)
-    # A law that follows a tone takes its line from what is left beside it.
-    beside = [[], selection.columns_of(selection.selected(fit.rig))]
-    left = [selection.regression.residuals(columns) for columns in beside]
-    tones = [
-        term
+    # Beside a law that imitates a tone, the residual has no line of it.
+    beside = dict.fromkeys([(), tuple(selection.columns_of(selection.selected(fit.rig)))])
+    residuals = [selection.regression.residuals(columns) for columns in beside]
+    tones = {
+        (e.name, term.inner[e.pulsation]): term
         for e in effects
         if e.pulsation is not None
-        for rows in left
-        for term in of_tone(e, terms_of.fit, terms_of.values, rows)
-    ]
-    return selection.with_terms(tones)
+        for rows in residuals
+        for term in of_tone(e, fit, values, rows)
+    }
+    return selection.with_terms(list(tones.values()))
 
 
 def _with_finer_grid(selection: Selection, terms_of: EffectTerms) -> Selection:
