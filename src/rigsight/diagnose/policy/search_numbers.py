@@ -102,7 +102,7 @@ class SearchNumbers:
     near: float = budget(
         25.0,
         "A candidate whose cost in the most excited stretches is below this factor of the best (five times its RMS) is fitted "
-        "to whole records.",
+        "to whole records; so is one to all windows if a very short fit of some is below this factor of the floor.",
     )
     alike_starts: float = budget(
         1.05, "All starts whose first fits end within this factor of the best cost are continued."

@@ -299,8 +299,13 @@ def _fitted(context: FitContext, reidentified: FittedModel, model: FittedModel) 
         (few.fit_windows(start, free, SEARCH.window_evaluations, most_rounds=1) for start in starts),
         key=lambda fit: fit.cost,
     )
+    # Only a model that can come to the floor is named in windows.
+    within_reach = np.sqrt(SEARCH.near) * VERDICT.at_floor
+    hopeful = [glimpse for glimpse in glimpses if glimpse.weighted_rms <= within_reach]
+    if not hopeful:
+        return _scored(context, model)
     problem = context.problem(structure, context.estimation)
-    fits = [problem.fit_windows(glimpse.values, free) for glimpse in glimpses[: SEARCH.window_starts]]
+    fits = [problem.fit_windows(glimpse.values, free) for glimpse in hopeful[: SEARCH.window_starts]]
     return _best_in_windows(context, model, fits)
 
 
