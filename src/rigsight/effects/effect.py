@@ -345,8 +345,12 @@ class Effect:
         signal
             One of `rigsight.effects.symbols`.
         """
+        return signal in self._symbols
+
+    @cached_property
+    def _symbols(self) -> frozenset[sp.Basic]:
         of_states = (part for state in self.states for part in (state.rate, state.limit) if part is not None)
-        return any(signal in part.free_symbols for part in (*self.equations.values(), *of_states))
+        return frozenset().union(*(part.free_symbols for part in (*self.equations.values(), *of_states)))
 
     def null_values(self) -> dict[str, float]:
         """Return the parameter values at which the effect vanishes."""

@@ -26,6 +26,8 @@ Floats = NDArray[np.float64]
 
 _ROUNDS = 60
 """Rounds in which friction and the load that it depends on settle; each shortens the difference by the friction coefficient."""
+_SETTLED = 1e-9
+"""Change of this force relative to its size at which it has settled."""
 _ACCURACY = 1e-5
 _ELEMENT: dict[str, Any] = {
     "name": "measured_joint",
@@ -157,7 +159,7 @@ def effect_force(effect: Effect, values: Mapping[str, float], motion: JointMotio
     force = np.zeros_like(motion.load)
     for _ in range(_ROUNDS):
         before, force = force, _along(effect.torque, values, motion, force)
-        if np.array_equal(before, force):
+        if np.max(np.abs(force - before)) <= _SETTLED * np.max(np.abs(force)):
             break
     return force
 
