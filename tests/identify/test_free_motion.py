@@ -53,8 +53,10 @@ def still(rig: Rig) -> Record:
         (AXIS, {"m", "d", "k", "force_off"}, "m"),
         (RUNNING_GEAR, {"J_z", "k_c", "k_d"}, "J_z"),
         (RIGS["drive_train"], {"J_m", "J_l", "k_s", "d_s", "d_m", "d_l", "k_l"}, "J_m"),
-        # Gravity is a known acceleration: masses alone still grow together.
-        (RIGS["cart_pendulum"], {"m_c", "m_p", "s", "I_p", "d_c", "d_p"}, "m_c"),
+        # Gravity is a known acceleration: masses alone still grow together. Of the masses only the sum counts: with one of them
+        # held, the other makes up for any factor.
+        (RIGS["cart_pendulum"], {"m_c", "m_p", "s", "I_p", "d_c", "d_p"}, "s"),
+        (RIGS["two_link_arm"], {"I_1", "I_2", "m_2", "s_1", "s_2", "d_1", "d_2"}, "I_2"),
         (rig_of_text(PENDULUM.format(of_J="parameters", default="lower = 1e-6")), {"J", "c_g", "d"}, "J"),
     ],
     ids=lambda value: getattr(value, "name", ""),

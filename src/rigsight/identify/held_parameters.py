@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import null_space
 
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
@@ -22,7 +23,7 @@ from rigsight.identify.rig_equations import equations_of
 from rigsight.identify.start.linear_start import linear_start
 from rigsight.identify.start.scales import characteristic_scales
 from rigsight.parameters import Parameter
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig, evaluated
 from rigsight.rigs.reading.dimensions import UnitError, dimension
@@ -30,9 +31,11 @@ from rigsight.simulate import compose
 from rigsight.units import behind
 
 _DRAWS = 3
-"""Number of random points at which the equations are compared; different expressions do not agree there by chance."""
+"""Least number of random points at which the equations are compared; different expressions do not agree there by chance."""
 _SAME = 1e-9
 """Relative difference of rates that counts as rounding error."""
+_STEP = 1e-5
+"""Relative change of a parameter for the slopes of rates, which are then as accurate as its square, and what counts as none."""
 _MASS = "[mass]"
 _MOST_TURNS = 1.0
 """Range of an angle up to which a spring may be there although none was given (an assumption): wires and flat spirals that are
@@ -80,7 +83,10 @@ def open_factor(
     inertias = {str(symbol) for symbol in rig.mechanism.kinetic.free_symbols}
     names = sorted(powers, key=lambda name: name not in inertias)
     known = [name for name in names if given.get(name)]
-    held = next(p for p in rig.parameters if p.name == (known or names)[0])
+    # An inertia that only counts in a sum with another one leaves the factor to that one.
+    left_open = _left_open(rig, records, constants)
+    first = min(known or names, key=left_open.__getitem__)
+    held = next(p for p in rig.parameters if p.name == first)
     usual = 1.0 if held.default is None else held.default
     value = given[held.name] if known else float(np.clip(usual, held.lower, held.upper))
     return OpenFactor(
@@ -104,18 +110,48 @@ def _moves_as_before(
     records: Sequence[Record],
 ) -> bool:
     """Return True if rates and readings do not change when the parameters are multiplied by a common factor."""
-    equations, rng = equations_of(rig), np.random.default_rng(0)
-    drawn = {p.name: float(rng.uniform(0.2, 0.8)) for p in rig.parameters}
-    grown = {name: value * 2.0 ** powers.get(name, 0.0) for name, value in drawn.items()}
-    z = rng.uniform(0.2, 0.8, (equations.n_states, _DRAWS))
-    u = np.zeros((3 * len(rig.inputs), _DRAWS))
-    if rig.inputs and not _rest_makes_up(rig, records):
-        u[0::3] = [[record[signal.name][0]] for signal in rig.inputs]
-    found = []
-    for values in (drawn, grown):
-        p = equations.parameters({**constants, **values}, record)
-        found.append(np.concatenate([equations.rates(z, u, p), equations.readings(z, u, p)]))
-    return bool(np.allclose(found[0], found[1], rtol=_SAME, atol=0.0))
+    motion = _Drawn(rig, record, constants, records)
+    grown = {name: value * 2.0 ** powers.get(name, 0.0) for name, value in motion.values.items()}
+    return bool(np.allclose(motion.moved(motion.values), motion.moved(grown), rtol=_SAME, atol=0.0))
+
+
+def _left_open(rig: Rig, records: Sequence[Record], constants: Mapping[str, float]) -> dict[str, int]:
+    """Return for each parameter how many others the motion of the records leaves open when it is held."""
+    names, slopes = [p.name for p in rig.parameters], []
+    for record in records:
+        motion = _Drawn(rig, record, constants, records)
+        above, below = (
+            np.array([motion.moved({**motion.values, name: factor * motion.values[name]}) for name in names])
+            for factor in (1.0 + _STEP, 1.0 - _STEP)
+        )
+        slopes.append((above - below).reshape(len(names), -1).T / (2.0 * _STEP))
+    without = null_space(np.vstack(slopes), rcond=_STEP)
+    return {
+        name: int(np.count_nonzero(np.linalg.norm(without @ null_space(without[[i]]), axis=1) > _STEP))
+        for i, name in enumerate(names)
+    }
+
+
+class _Drawn:
+    """A rig with random numbers at random points of its motion."""
+
+    def __init__(
+        self, rig: Rig, record: Record, constants: Mapping[str, float], records: Sequence[Record]
+    ) -> None:
+        self._equations, rng = equations_of(rig), np.random.default_rng(0)
+        self.values = {p.name: float(rng.uniform(0.2, 0.8)) for p in rig.parameters}
+        self._record, self._constants = record, constants
+        draws = max(_DRAWS, len(self.values))
+        self._z = rng.uniform(0.2, 0.8, (self._equations.n_states, draws))
+        self._u = np.zeros((3 * len(rig.inputs), draws))
+        if rig.inputs and not _rest_makes_up(rig, records):
+            self._u[0::3] = [[record[signal.name][0]] for signal in rig.inputs]
+
+    def moved(self, values: Mapping[str, float]) -> Floats:
+        """Return rates and readings with other numbers, one below the other, shape (n, n_points)."""
+        p = self._equations.parameters({**self._constants, **values}, self._record)
+        rates = self._equations.rates(self._z, self._u, p)
+        return np.concatenate([rates, self._equations.readings(self._z, self._u, p)])
 
 
 def _rest_makes_up(rig: Rig, records: Sequence[Record]) -> bool:
