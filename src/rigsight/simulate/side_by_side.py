@@ -104,8 +104,9 @@ def choose_substeps(
     n_samples: int,
     accuracy: float,
     most: int = _SUBSTEPS[-1],
+    least_sizes: Floats | float = 0.0,
 ) -> Substeps:
-    """Return few substeps whose error relative to the accurate integrator is below `accuracy`, with fewest for slow motion."""
+    """Return few substeps whose error is below `accuracy`, relative to the spread of each output or its least size."""
     # Because of kinks, the error decreases with the square of the step; numbers that this rule excludes are not tried.
     if structure.late_inputs is None:
         return Substeps(1)
@@ -113,7 +114,7 @@ def choose_substeps(
     exact = simulate_outputs(structure, held, p, initial_state, n_samples, min(accuracy / 10.0, 1e-5), taken)
     # The squares of a finite motion may overflow.
     with np.errstate(over="ignore", invalid="ignore"):
-        size = np.std(exact, axis=0) + 1e-300
+        size = np.maximum(np.std(exact, axis=0), least_sizes) + 1e-300
     state = np.asarray(initial_state, dtype=np.float64)[:, None]
     # A state exactly at rest would stay at rest even with unstable steps, so it is perturbed.
     both = np.hstack([state, state + _NUDGE * (1.0 + np.abs(state))])

@@ -10,15 +10,20 @@ from rigsight.rigs import AXIS
 
 from ...inverse.test_proposal import AXIS_VALUES, campaign
 
-HIDDEN = [effect_named(name) for name in ("input_delay", "coulomb_friction")]
-
 
 @pytest.mark.slow
-def test_a_late_command_beside_friction_may_be_a_late_sensor() -> None:
-    own = campaign(AXIS, {**AXIS_VALUES, "T_d": 0.015, "T_c": 1.5}, HIDDEN, (5.0, 10.0, 20.0))
+@pytest.mark.parametrize(
+    ("beside", "size", "family"),
+    [("coulomb_friction", {"T_c": 1.5}, "dry_friction"), ("cubic_stiffness", {"k_3": 1e5}, "spring_law")],
+)
+def test_a_late_command_beside_another_cause_may_be_a_late_sensor(
+    beside: str, size: dict[str, float], family: str
+) -> None:
+    hidden = [effect_named(name) for name in ("input_delay", beside)]
+    own = campaign(AXIS, {**AXIS_VALUES, "T_d": 0.015, **size}, hidden, (5.0, 10.0, 20.0))
     found = diagnose(own, CATALOGUE)
     probable = {(str(own.family), own.where): own.probability for own in found.families}
-    assert probable["dry_friction", "dynamics"] > 0.9
+    assert probable[family, "dynamics"] > 0.9
     late = [probable.get(("delay_or_lag", place), 0.0) for place in ("actuator", "sensor")]
     assert min(late) > 0.1
     assert sum(late) == pytest.approx(1.0, abs=0.02)

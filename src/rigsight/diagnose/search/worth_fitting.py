@@ -202,4 +202,9 @@ class SingleModels:
         """Families at their places that the motion names, where it shows the force."""
         if not self.worth.is_shown or self.proposal is None:
             return frozenset()
-        return frozenset((cause.family, cause.where) for cause in self.proposal.taken)
+        named = {(cause.family, cause.where) for cause in self.proposal.taken}
+        if any(family is Family.DELAY_OR_LAG for family, _ in named):
+            # What is late elsewhere makes the same readings late.
+            late = filter(is_delay_or_lag, self.worth.named)
+            named |= {(effect.family, self.context.rig.where(effect)) for effect in late}
+        return frozenset(named)

@@ -124,6 +124,11 @@ class RecordData:
         """Return the data with only the first samples of measurement and input."""
         return replace(self, held=self.held.first(n_samples), measured=self.measured[:n_samples])
 
+    @cached_property
+    def spreads(self) -> Floats:
+        """Standard deviation of each output as measured, shape (n_outputs,), 0 where it was not."""
+        return np.where(self.weights > 0.0, np.std(self.measured, axis=0), 0.0)
+
     def parameters(self, p: Floats) -> Floats:
         """Return parameters, shape (n_parameters,) or (n_parameters, n_sets), with the record's own constants."""
         if not self.own:

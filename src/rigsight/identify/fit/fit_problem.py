@@ -105,9 +105,10 @@ class Problem:
 
         def chosen(index: int) -> Substeps:
             own, n = data.records[index], data.records[index].record.n_samples
-            at = own.parameters(p), states[index]
+            # A wrong model may stand still where the rig moves, and its motion asks for no accuracy.
+            at, sizes = (own.parameters(p), states[index]), own.spreads
             try:
-                return choose_substeps(data.structure, own.held, *at, n, data.accuracy, MOST_SUBSTEPS)
+                return choose_substeps(data.structure, own.held, *at, n, data.accuracy, MOST_SUBSTEPS, sizes)
             except SimulationError:
                 return Substeps(MOST_SUBSTEPS)
 

@@ -9,6 +9,7 @@ import sympy as sp
 
 from rigsight.effects import Effect, Place, family_of, placed
 from rigsight.effects.symbols import derivative
+from rigsight.inverse import hidden_effects
 from rigsight.rigs import Drive, Joint, Rig, evaluated
 from rigsight.rigs.parts import force_symbol
 from rigsight_bench.trials.counted import counted_effects
@@ -49,7 +50,7 @@ class Spot:
 
 
 def spots(base: Base) -> tuple[Spot, ...]:
-    """Return all effects that can be added to the records of a campaign, each at its places.
+    """Return all effects that can be added to the records of a campaign and show in them, each at its places.
 
     Parameters
     ----------
@@ -57,6 +58,8 @@ def spots(base: Base) -> tuple[Spot, ...]:
         Base equations of the campaign.
     """
     found = [spot for effect in counted_effects() for spot in _of_effect(base, effect)]
+    hidden = hidden_effects(base.campaign, base.values, [spot.effect for spot in found])
+    found = [spot for spot in found if spot.effect.name not in hidden]
     return tuple(spot for spot in found if not is_beside_own(base, spot) or base.without is not None)
 
 
