@@ -200,6 +200,31 @@ def test_every_family_of_an_axis_is_offered(base: Base) -> None:
     assert not names & {"actuator_lag", "input_saturation", "speed_limit", "sensor_delay", "inertia"}
 
 
+def test_no_cause_over_a_position_is_added_where_none_is_known() -> None:
+    tables = {
+        "name": "wheel",
+        "inputs": {"u": {"unit": "1"}},
+        "parameters": {"J": {"unit": "kg m^2", "log": True}, "b": {"unit": "N m s/rad", "lower": 0.0}},
+        "constants": {"k_t": {"unit": "N m", "default": 1.0}},
+        "coordinates": {"q": {"unit": "rad"}},
+        "energy": {"kinetic": "J*d(q)^2/2"},
+        "joints": {"bearing": {"motion": "q", "damping": "b"}},
+        "drives": {"motor": {"signal": "u", "force": "k_t*motor", "along": "q"}},
+        "sensors": {"speed": {"reads": "d(q)", "unit": "rad/s"}},
+    }
+    rig, rng, values = rig_of_tables(tables, "wheel"), np.random.default_rng(5), {"J": 0.01, "b": 0.04}
+    steps = [np.repeat(rng.uniform(0.2, 1.0, 8), 250) for _ in range(2)]
+    records = [
+        Record(f"r{n}", 0.01, {"u": u}, {"u": "1"}, role=("estimation", "validation")[n])
+        for n, u in enumerate(steps)
+    ]
+    noise = 0.01 * rng.standard_normal(2000)
+    records = [r.with_signals(speed=simulate(compose(rig), values, r)["speed"] + noise) for r in records]
+    families = {family_of(s.effect.name) for s in spots(base_of(make_campaign(rig, records)))}
+    assert "dry_friction" in families
+    assert not families & {"spring_law", "gravity", "play_and_stops"}
+
+
 def test_every_effect_of_the_catalogue_has_a_family() -> None:
     assert not [effect.name for effect in CATALOGUE if family_of(effect.name) == "own"]
     assert family_of("iwan_hysteresis@shaft") == "memory"
