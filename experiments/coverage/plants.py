@@ -19,8 +19,8 @@ from rigsight.diagnose.replicates import with_forces
 from rigsight.effects import Effect
 from rigsight.errors import SimulationError
 from rigsight.identify import GreyBoxFit, characteristic_scales
-from rigsight.identify.typical_size import typical_size
 from rigsight.records import Hold, Kind, Record
+from rigsight.records.signals import typical_size
 from rigsight.rigs import Rig
 from rigsight.simulate import compose, simulate
 from rigsight_bench.trials.any_rig_campaign import (

@@ -1,4 +1,4 @@
-"""What does a signal show: does it change, is it clipped, has it a period, does it repeat another, is it a reference?"""
+"""What does a signal show: its size, does it change, is it clipped, has it a period, does it repeat another, is it a reference?"""
 
 from __future__ import annotations
 
@@ -30,6 +30,10 @@ _SHORTEST = 31
 _APART = 0.5
 """Correlation below which a signal has left one period for the next: over the lags of a period its mean is zero, so it falls
 below, while noise as small as `_ALIKE` crosses it once."""
+_MOST = 98.0
+"""Percentile of its deviations that is the size of a signal: without its rarest values."""
+_STILL = 1e-12
+"""Range of a signal relative to its size that counts as rounding error."""
 _ROUGH = 0.5
 """Share of a difference that must be as rough as white noise: a slightly other amplitude or time is smooth."""
 
@@ -37,9 +41,30 @@ REFERENCE = "reference"
 """The signal that a record may hold beside those of its rig; a rig with a signal of this name means its own."""
 
 
+def typical_size(signals: Sequence[Floats]) -> float:
+    """Return the 98th percentile of the deviations from the median; never zero."""
+    deviations = np.concatenate([np.abs(signal - np.median(signal)) for signal in signals])
+    size = float(np.percentile(deviations, _MOST)) or float(np.max(deviations))
+    return size or 1.0
+
+
+def size_about_zero(signals: Sequence[Floats]) -> float:
+    """Return the 98th percentile of the magnitudes; zero for a signal that is zero."""
+    values = np.concatenate([np.abs(signal) for signal in signals])
+    return float(np.percentile(values, _MOST)) or float(np.max(values))
+
+
+def size_of_signal(signals: Sequence[Floats]) -> float:
+    """Return the typical size of deviations from the median, or the magnitude of a constant signal (which may be zero)."""
+    largest = max(float(np.max(np.abs(signal))) for signal in signals)
+    if max(float(np.ptp(signal)) for signal in signals) <= _STILL * largest:
+        return largest
+    return typical_size(signals)
+
+
 def is_constant(samples: Floats) -> bool:
     """Return True if no sample of shape (n_samples,) differs from the first by more than rounding."""
-    return bool(np.ptp(samples) <= 1e-12 * np.max(np.abs(samples)))
+    return bool(np.ptp(samples) <= _STILL * np.max(np.abs(samples)))
 
 
 def moves_beyond_noise(samples: Floats) -> bool:

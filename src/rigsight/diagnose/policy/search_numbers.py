@@ -139,7 +139,9 @@ class SearchNumbers:
     )
     most_followed: int = budget(6, "Number of effects that are fitted together with another.")
     near_the_best: float = budget(
-        2.0, "Models whose cost is at most this factor of the best at a first fit are fitted carefully."
+        2.0,
+        "Models whose cost is at most this factor of the best at a first fit are fitted carefully, and sets of causes whose cost "
+        "is at most this factor of that without them.",
     )
     both_ways: int = budget(
         6, "Number of the most promising pairs that are also tried from the fit of the second effect."

@@ -12,9 +12,8 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from rigsight.effects import Place, State
 from rigsight.identify.rig_equations import RigEquations, equations_of
-from rigsight.identify.typical_size import size_of_signal
 from rigsight.records.record import Floats, Record
-from rigsight.records.signals import is_constant
+from rigsight.records.signals import is_constant, size_of_signal
 from rigsight.rigs import Rig, evaluated
 from rigsight.simulate import Structure
 from rigsight.simulate.equations.derivatives import declared_start

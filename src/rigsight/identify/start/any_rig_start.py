@@ -24,9 +24,9 @@ from rigsight.identify.start.linearized_responses import LinearizedResponses
 from rigsight.identify.start.scales import scales_at_places
 from rigsight.identify.start.spread_search import AGREEING, PERSISTENT, balanced, ends_of_search
 from rigsight.identify.start.weak_equations import WeakEquations
-from rigsight.identify.typical_size import size_of_signal
 from rigsight.parameters import Parameter
 from rigsight.records.record import Floats, Record
+from rigsight.records.signals import size_of_signal
 from rigsight.rigs import Rig
 from rigsight.simulate import compose, parameter_vector
 from rigsight.simulate.prescribed_motion import smooth_motion

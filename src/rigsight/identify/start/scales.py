@@ -15,9 +15,8 @@ from rigsight.identify.fit.first_states import rig_state
 from rigsight.identify.fit.windows import pieces
 from rigsight.identify.rig_equations import RigEquations, equations_of
 from rigsight.identify.start.measured_states import measured_states, sensor_factors
-from rigsight.identify.typical_size import size_about_zero, size_of_signal, typical_size
 from rigsight.records.record import Floats, Record
-from rigsight.records.signals import is_constant
+from rigsight.records.signals import is_constant, size_about_zero, size_of_signal, typical_size
 from rigsight.rigs import Rig, evaluated
 from rigsight.simulate import simulate_outputs
 from rigsight.simulate.prescribed_motion import smooth_motion

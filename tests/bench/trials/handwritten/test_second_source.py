@@ -9,8 +9,8 @@ import pytest
 
 from rigsight.diagnose.fit_context import candidates_on
 from rigsight.effects import CATALOGUE, Effect, kind_of
-from rigsight.identify.typical_size import typical_size
 from rigsight.records import Hold, Record
+from rigsight.records.signals import typical_size
 from rigsight.rigs import RIGS
 from rigsight.simulate import compose, simulate
 from rigsight_bench.trials.handwritten.equations.held_inputs import Generated, Held, Input

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from rigsight.identify import FitResult, characteristic_scales
-from rigsight.identify.typical_size import typical_size
 from rigsight.records import Record
+from rigsight.records.signals import typical_size
 from rigsight.rigs import RIGS, Rig
 from rigsight.simulate import compose
 from rigsight_bench.trials.fitted import fitted, largest_left

@@ -15,8 +15,8 @@ from rigsight.effects import Effect, effect_named, kind_of, placed
 from rigsight.errors import SimulationError
 from rigsight.identify import FitResult, characteristic_scales
 from rigsight.identify.fit.windows import cut, window_length
-from rigsight.identify.typical_size import typical_size
 from rigsight.records import Record
+from rigsight.records.signals import typical_size
 from rigsight.rigs import Rig, evaluated
 from rigsight.simulate import Structure, compose, simulate
 from rigsight_bench.trials.fitted import fitted, largest_left, left_of
