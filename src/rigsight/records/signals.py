@@ -1,4 +1,4 @@
-"""What does a signal show: its size, does it change, is it clipped, has it a period, does it repeat another, is it a reference?"""
+"""What does a signal show: its size, does it change, is it clipped, has it a period, repeats it another, is it a reference?"""
 
 from __future__ import annotations
 
