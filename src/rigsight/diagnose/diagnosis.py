@@ -77,29 +77,7 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose the gap between a simulation and records of its rig.
 
-    Parameters
-    ----------
-    campaign
-        Records and the given simulation.
-    effects
-        Candidates.
-    seed
-        Seed of the resampling behind probabilities.
-    n_jobs
-        Candidates fitted at the same time.
-    progress
-        Called with a short text when a stage or candidate is done.
-    prepare
-        Called with structures that are about to be simulated, to compile them side by side.
-    memory
-        Where the outcomes of fits are kept; those that it has are not done again.
-
-    Raises
-    ------
-    InputError
-        If there is no estimation record or it does not move the rig.
-    SimulationError
-        If the rig's own equations cannot be simulated near the records.
+    `prepare` compiles structures that are about to be simulated side by side; fits that `memory` has are not done again.
     """
     say = progress or (lambda _: None)
     if not campaign.estimation:

@@ -57,42 +57,21 @@ class OutputGap:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A set of effects that was fitted and scored.
+    """A set of effects that was fitted and scored."""
 
-    Attributes
-    ----------
-    effects
-        Names, strongest first, with ``@place`` where a rig has several places; empty for the re-identified equations without an
-        effect.
-    where
-        Place of each.
-    probability
-        That this set is the cause, given the records and the candidates tried.
-    validation_nrmse, estimation_nrmse
-        NRMSE by output.
-    error_over_noise
-        Weighted RMS of the validation residuals in units of the noise floor; 1 is perfect.
-    parameters
-        Every fitted parameter of rig and effects.
-    success, message
-        Whether the fit converged, and the message of the optimizer.
-    grounds
-        Basis of the probability; None for the equations without an effect.
-    std_method
-        Where the standard errors come from: ``"bootstrap"`` for the diagnosed simulation (`bootstrap.py`), else
-        ``"formula"``, that of the fit.
-    """
-
+    # Names, strongest first, with ``@place`` where a rig has several places; empty for the re-identified equations alone.
     effects: tuple[str, ...]
-    where: tuple[str, ...]
-    probability: float
-    validation_nrmse: dict[str, float]
+    where: tuple[str, ...]  # place of each
+    probability: float  # that this set is the cause, given the records and the candidates tried
+    validation_nrmse: dict[str, float]  # by output
     estimation_nrmse: dict[str, float]
+    # Weighted RMS of the validation residuals in units of the noise floor; 1 is perfect.
     error_over_noise: float
-    parameters: dict[str, Estimate]
-    success: bool
+    parameters: dict[str, Estimate]  # every fitted parameter of rig and effects
+    success: bool  # whether the fit converged
     message: str
-    grounds: Grounds | None = None
+    grounds: Grounds | None = None  # basis of the probability; None for the equations without an effect
+    # Source of the standard errors: ``"bootstrap"`` for the diagnosed simulation, else ``"formula"``, that of the fit.
     std_method: StdMethod = "formula"
 
 

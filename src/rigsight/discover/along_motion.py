@@ -84,17 +84,7 @@ class _Chosen:
 
 
 class AlongMotion:
-    """The regression of the equations of a rig along the motion of its estimation records.
-
-    Parameters
-    ----------
-    terms_of
-        Equations along the motions.
-    selection
-        All terms that compete.
-    modelled
-        Effects of the given simulation, which are in every equation.
-    """
+    """The regression of the equations of a rig along its estimation records; `modelled` effects are in every equation."""
 
     def __init__(self, terms_of: EffectTerms, selection: Selection, modelled: Sequence[Effect]) -> None:
         self.terms_of, self._selection, self._modelled = terms_of, selection, modelled

@@ -32,18 +32,7 @@ def inclusion_probabilities(
     """Return the share of draws of stretches of the rows in which each term is selected, shape (n_terms,).
 
     The support of a draw is the smallest whose residual hardly exceeds that of the support with the lowest Bayesian information
-    criterion.
-
-    Parameters
-    ----------
-    terms
-        Columns that compete, without what the numbers of the rig do, shape (n_rows, n_terms).
-    target
-        The same of the force that the equations leave, shape (n_rows,).
-    independent
-        Number of independent rows.
-    rng
-        Of the draws.
+    criterion. Terms of shape (n_rows, n_terms) and the force of shape (n_rows,) are without what the numbers of the rig do.
     """
     blocks = np.array_split(np.arange(target.size), min(_N_BLOCKS, target.size))
     counts = np.zeros(terms.shape[1])

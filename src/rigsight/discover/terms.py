@@ -97,15 +97,7 @@ def known_terms() -> dict[str, Effect]:
 
 
 def offered_terms(rig: Rig, own: Sequence[Effect] = ()) -> list[Effect]:
-    """Return the effects that can be terms of the equations of motion of a rig, at its places.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    own
-        Effects of the user, beside those of the catalogue.
-    """
+    """Return the effects, of the catalogue or the user, that can be terms in the equations of a rig, at its places."""
     found = []
     for effect in (*CATALOGUE, *own, *MONOMIALS, *LINEAR, *DRIVE_POWERS):
         if effect.place not in (Place.DYNAMICS, Place.ACTUATOR):
