@@ -25,7 +25,7 @@ from rigsight.rigs import Rig
 from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.own.effect_checks import failed_checks
-from rigsight.workflow.own.effect_file import effect_file
+from rigsight.workflow.own.own_effects import effect_file
 from rigsight.workflow.run.kernels import checked_jobs
 from rigsight.workflow.run.progress import Listener, Stage, report_notes, silent
 from rigsight.workflow.run.results import ELSEWHERE, check_writable, json_text, write_together

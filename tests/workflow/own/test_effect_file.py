@@ -15,8 +15,7 @@ from rigsight.rigs import AXIS
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
 from rigsight.workflow.own.effect_checks import failed_checks
-from rigsight.workflow.own.effect_file import effect_file
-from rigsight.workflow.own.own_effects import own_effects
+from rigsight.workflow.own.own_effects import effect_file, own_effects
 
 (JOINT,) = AXIS.mechanism.joints
 

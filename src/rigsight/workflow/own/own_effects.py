@@ -1,4 +1,4 @@
-"""Load a user's own effects from Python files and installed packages, and find the effect and the place that a name means.
+"""Load a user's own effects from Python files and installed packages, find what a name means, and write such a file.
 
 A file is executed, as code that the user chose to run; every `Effect` at its top level is taken.
 """
@@ -7,8 +7,11 @@ from __future__ import annotations
 
 import ast
 import importlib.metadata
+import json
+import re
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 
 from rigsight.campaign import Campaign
@@ -16,6 +19,8 @@ from rigsight.diagnose.fit_context import candidates_on
 from rigsight.effects import AT, CATALOGUE, Effect, effect_named, kind_of, placed
 from rigsight.effects.effect import PARTS
 from rigsight.errors import InputError, nearest
+from rigsight.libraries.templates import filled, template_parts
+from rigsight.parameters import Parameter
 from rigsight.rigs import Rig
 from rigsight.simulate.printing.notation import text
 from rigsight.workflow.own.effect_declaration import declaration_faults
@@ -26,6 +31,7 @@ ENTRY_POINTS = "rigsight.effects"
 """Entry point group of packages that bring effects; each entry is an `Effect` or a tuple of them."""
 CHECKING = "Checking own effects"
 _LONGEST_EQUATION = 160
+_NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*")
 _Declared = tuple[Effect, str]
 """An effect that is not in the catalogue, and the place of its declaration for messages."""
 _MISSING = "--effects expects a Python file. To try only one effect of the catalogue, use --effect NAME."
@@ -223,3 +229,39 @@ def candidates_of(campaign: Campaign, effects: Sequence[Effect]) -> list[Effect]
             "'rigsight effects' lists all with their kind of place."
         )
     return found
+
+
+def effect_file(about: str, effects: Mapping[str, Effect]) -> str:
+    """Return the text of a Python file that declares forces at joints: as Python text -> the effect that resists with each."""
+    parts = template_parts("workflow", "effects.py.txt")
+    numbers = list(dict.fromkeys(p.name for effect in effects.values() for p in effect.parameters))
+    read = {name for force in effects for name in _NAME.findall(force)} - {*numbers}
+    head = {"ABOUT": about, "READ": ", ".join(sorted(read)), "NUMBERS": ", ".join(numbers)}
+    head["NAMES"] = " ".join(numbers)
+    declared = [filled(parts["EFFECT"], _fragments(force, effect)) for force, effect in effects.items()]
+    return "\n".join([filled(parts["HEAD"], head), *declared]) + "\n"
+
+
+def _fragments(force: str, effect: Effect) -> dict[str, str]:
+    return {
+        "CONSTANT": effect.name.upper(),
+        "NAME": effect.name,
+        "SUMMARY": _literal(effect.summary),
+        "PARAMETERS": "\n".join(f"        {_declared(p)}," for p in effect.parameters),
+        "ENERGY": effect.energy.name,
+        "TREND": effect.signature.gain_trend.name,
+        "EVEN": str(effect.signature.even_harmonics),
+        "TORQUE": force,
+    }
+
+
+def _declared(parameter: Parameter) -> str:
+    """Return the call that makes a parameter; what is as usual is left out."""
+    usual = Parameter(parameter.name, parameter.description)
+    given = {field.name: getattr(parameter, field.name) for field in fields(parameter)}
+    said = [f"{name}={_literal(value)}" for name, value in given.items() if value != getattr(usual, name)]
+    return f"Parameter({', '.join([_literal(parameter.name), _literal(parameter.description), *said])})"
+
+
+def _literal(value: object) -> str:
+    return json.dumps(value) if isinstance(value, str) else repr(value)
