@@ -14,7 +14,7 @@ from rigsight.effects import Effect
 from rigsight.errors import InputError, check_option
 from rigsight.identify.identification import Identification
 from rigsight.plot.fitted_numbers import discovery_figure
-from rigsight.report.identification import identification_html
+from rigsight.report.identification import identification_html, joint_estimates
 from rigsight.report.record_views import record_drawing
 from rigsight.report.sections import TRUST_COLUMNS, budget_drawing, ranking_drawing, trust_drawing, trust_rows
 from rigsight.report.terminal import diagnosis_html, discovery_html
@@ -296,10 +296,10 @@ class IdentificationResult(Result, Identification):
             If there is no such table, or pandas is not installed.
         """
         check_option("The table", table, get_args(IdentificationTable))
-        columns = ("parameter", "value", "std", "unit")
         if table == "joint":
-            return self._frame(self._joint_rows(), columns)
-        return self._frame(self._record_rows(), ("record", "amplitude", *columns))
+            return self._estimates("parameter", joint_estimates(self))
+        columns = ("record", "amplitude", "parameter", "value", "std", "unit")
+        return self._frame(self._record_rows(), columns)
 
     def _record_rows(self) -> Iterator[dict[str, Any]]:
         for record in self.records:
@@ -308,15 +308,6 @@ class IdentificationResult(Result, Identification):
                     "record": record.record.name, "amplitude": record.amplitude, "parameter": name,
                     "value": value, "std": std, "unit": self.units.get(name, ""),
                 }  # fmt: skip
-
-    def _joint_rows(self) -> Iterator[dict[str, Any]]:
-        fit, pooled = self.joint.fit.fit, self.joint.pooled
-        found = {name: (fit.values[name], fit.standard_errors[name]) for name in self.joint.names}
-        if pooled is not None:
-            errors = pooled.standard_errors
-            found |= {name: (value, errors[name]) for name, value in pooled.values.items()}
-        for name, (value, std) in found.items():
-            yield {"parameter": name, "value": value, "std": std, "unit": self.units.get(name, "")}
 
     def _write(self, folder: Path) -> tuple[Path, ...]:
         return write_identification(self, folder)

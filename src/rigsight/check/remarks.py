@@ -168,8 +168,8 @@ def _reversed(campaign: Campaign, records: Sequence[Record]) -> Iterator[Remark]
 
 def _driving(campaign: Campaign) -> list[str]:
     """Return the inputs that drive the rig; a prescribed motion is measured like a reading."""
-    prescribing = {str(c.prescribed_by) for c in campaign.rig.mechanism.prescribed}
-    return [signal.name for signal in campaign.rig.inputs if signal.name not in prescribing]
+    mechanism = campaign.rig.mechanism
+    return [signal.name for signal in campaign.rig.inputs if signal.name not in mechanism.prescribing]
 
 
 def _lasting(campaign: Campaign) -> Iterator[Remark]:

@@ -81,7 +81,7 @@ def signal_paths(rig: Rig) -> tuple[SignalPath, ...]:
     On a rig of several motions they are each input to each sensor.
     """
     if not rig.has_one_motion:
-        prescribing = {coordinate.prescribed_by for coordinate in rig.mechanism.prescribed}
+        prescribing = rig.mechanism.prescribing
         inputs = tuple(signal.name for signal in rig.inputs)
         return tuple(
             SignalPath(source, sensor.name, "pt2", sensor.upper_cut, source not in prescribing, inputs)

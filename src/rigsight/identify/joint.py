@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from operator import attrgetter
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.stats import chi2
 
 from rigsight.errors import InputError
-from rigsight.identify.fit.covariance import LEVEL
+from rigsight.identify.fit.covariance import LEVEL, normal_interval
 from rigsight.identify.fit.fit_data import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.identify.start.linear_start import linear_start
@@ -45,8 +45,7 @@ class JointFit:
 
     def interval(self, name: str, level: float = LEVEL) -> tuple[float, float]:
         """Return the confidence interval of a fitted parameter of the joint set."""
-        width = float(norm.ppf(0.5 + 0.5 * level)) * self.fit.standard_errors[name]
-        return self.fit.values[name] - width, self.fit.values[name] + width
+        return normal_interval(self.fit.values[name], self.fit.standard_errors[name], level)
 
 
 def fit_jointly(

@@ -58,6 +58,11 @@ class LinearView:
     images: Mapping[tuple[str, str], NDArray[np.complex128]]
 
     @property
+    def constants_text(self) -> str:
+        """The constants on a line: ``"m = 2, v = 1"``."""
+        return ", ".join(f"{name} = {value:g}" for name, value in self.constants.items())
+
+    @property
     def has_responses(self) -> bool:
         """True if there is a measured frequency response; steps give none."""
         return self.measured is not None and bool(self.measured.found)
@@ -86,7 +91,8 @@ def measured_responses(
         [signal.name for signal in rig.outputs],
         poles=_POLES[method],
         resolution=resolution,
-        smooth=sorted(_smooth(rig)),
+        # They were measured, and have no content above the Nyquist frequency.
+        smooth=sorted(rig.mechanism.prescribing),
     )
 
 
@@ -149,7 +155,7 @@ def linear_view(
             np.sum(np.abs([np.zeros_like(curve.values), *(c[:, row, column] for c in changes)]) ** 2, axis=0)
         )
         model[source, response] = (found.frequency_response(curve.omega)[:, row, column], np.asarray(spread))
-        if source not in _smooth(structure.rig):
+        if source not in structure.rig.mechanism.prescribing:
             images[source, response] = images_of_held_input(found, curve.omega, records)[:, row, column]
     return LinearView(
         constants=constants,
@@ -160,11 +166,6 @@ def linear_view(
         model=model,
         images=images,
     )
-
-
-def _smooth(rig: Rig) -> set[str]:
-    """Return the inputs without content above the Nyquist frequency: prescribed motions, because they were measured."""
-    return {str(coordinate.prescribed_by) for coordinate in rig.mechanism.prescribed}
 
 
 def images_of_held_input(

@@ -1,4 +1,4 @@
-"""Conversion of units as written in files to SI; the only module that uses pint."""
+"""Conversion of units as written in measured files to SI."""
 
 from __future__ import annotations
 

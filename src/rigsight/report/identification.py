@@ -13,7 +13,8 @@ from rich.table import Table
 
 from rigsight.diagnose.result import Estimate
 from rigsight.identify import FitResult, PhysicalEstimates
-from rigsight.identify.hysteresis.derived import LEVEL, Derived
+from rigsight.identify.fit.covariance import LEVEL
+from rigsight.identify.hysteresis.derived import Derived
 from rigsight.identify.identification import (
     HysteresisIdentification,
     Identification,
@@ -133,15 +134,21 @@ def _by_amplitude(found: Identification) -> list[RecordIdentification]:
     return sorted(found.records, key=lambda record: record.amplitude)
 
 
+def joint_estimates(found: Identification) -> dict[str, Estimate]:
+    """Return the numbers of the joint fit, then those that are the mean of the records' own."""
+    joint, units = found.joint, found.units
+    pooled = {} if joint.pooled is None else _estimates(joint.pooled.values, joint.pooled, units)
+    return _estimates(joint.names, joint.fit.fit, units) | pooled
+
+
 def joint_rows(found: Identification) -> Iterator[tuple[str, str]]:
     """Yield subject and words: the numbers of the joint fit, and how it follows each record."""
-    fit, reached = found.joint.fit.fit, {bound.name: bound.side for bound in found.reached}
-    for name, estimate in _estimates(found.joint.names, fit, found.units).items():
-        reported = estimate_text(estimate)
-        yield name, f"{reported}, at its {reached[name]} bound" if name in reached else reported
-    if found.joint.pooled is not None:
-        for name, estimate in _estimates(found.joint.pooled.values, found.joint.pooled, found.units).items():
-            yield name, f"{estimate_text(estimate)}, mean of the records' own"
+    remarks = {bound.name: f", at its {bound.side} bound" for bound in found.reached}
+    remarks |= dict.fromkeys(
+        found.joint.pooled.values if found.joint.pooled else (), ", mean of the records' own"
+    )
+    for name, estimate in joint_estimates(found).items():
+        yield name, f"{estimate_text(estimate)}{remarks.get(name, '')}"
     if found.joint.conicity is not None:
         yield "delta_0", found.joint.conicity.statement
     for score in found.joint.scores:
@@ -154,7 +161,7 @@ def linear_rows(found: Identification) -> Iterator[tuple[str, str]]:
         for c in found.identifiability.combinations:
             yield c.text, estimate_text(Estimate(c.value, c.std, c.unit))
     for view in found.views:
-        at = _constants_text(view)
+        at = view.constants_text
         for mode in view.modes:
             frequency = estimate_text(Estimate(mode.natural_frequency, mode.frequency_std, "rad/s"))
             damping = estimate_text(Estimate(mode.damping_ratio, mode.damping_std, "1"))
@@ -241,7 +248,6 @@ def render_identification(
         n_parameters=len(names),
         views=list(zip(identification.views, _figures(identification.views, drawings), strict=True)),
         labels=labels,
-        constants_text=_constants_text,
         stable=_STABLE,
         place=_place,
         polynomial=_polynomial,
@@ -299,10 +305,6 @@ def _figures(views: Sequence[LinearView], drawings: Sequence[Figure]) -> Iterato
             "Magnitude and phase of each sensor's response to each input: measured from all records together (gray, with 95 % "
             "bands), and that of the fitted equations, linearized at equilibrium (blue).",
         )
-
-
-def _constants_text(view: LinearView) -> str:
-    return ", ".join(f"{name} = {value:g}" for name, value in view.constants.items())
 
 
 def _place(linear: Linearization) -> str:

@@ -126,7 +126,7 @@ def _responses(
 
 def _response(record: Record, source: str, response: str, rig: Rig) -> FrequencyResponse:
     """Return the response to one input, beside the others that move in the same record."""
-    prescribing = [str(c.prescribed_by) for c in rig.mechanism.prescribed]
+    prescribing = sorted(rig.mechanism.prescribing)
     moving = [signal.name for signal in rig.inputs if not is_constant(record[signal.name])]
     if len(moving) == 1:
         # A measured motion is smooth between its samples.

@@ -30,6 +30,12 @@ SMOOTHED = 15
 duration of the record and not on the sample rate, and the resonance excited by a disturbance is several lines wide."""
 
 
+def normal_interval(value: float, error: float, level: float = LEVEL) -> tuple[float, float]:
+    """Return the confidence interval of an estimate with its standard error."""
+    width = float(norm.ppf(0.5 + 0.5 * level)) * error
+    return value - width, value + width
+
+
 def colored_covariance(
     sensitivities: Sequence[tuple[Floats, Floats]],
     n_common: int,

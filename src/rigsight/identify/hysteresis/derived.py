@@ -15,15 +15,13 @@ from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
 from rigsight.errors import InputError
 from rigsight.identify.fit.coordinates import Coordinates
-from rigsight.identify.fit.covariance import symmetric_eigen
+from rigsight.identify.fit.covariance import LEVEL, symmetric_eigen
 from rigsight.identify.fit.fit_data import FitResult
 from rigsight.records.record import Floats, Record
 from rigsight.rigs import built_in
 from rigsight.simulate import Structure, compose, simulate_sets
 from rigsight.simulate.input_hold import hold_motion
 
-LEVEL = 0.95
-"""Confidence level of the intervals."""
 _DRAWS = 400
 _CYCLES = 4
 _SAMPLES_PER_CYCLE = 512

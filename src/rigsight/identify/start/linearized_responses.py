@@ -137,7 +137,7 @@ def _lines(equations: RigEquations, record: Record, p: Floats, most: int) -> _Li
     u = equations.inputs_of(record)[1]
     mean = np.zeros(u.shape[0])
     mean[0::3] = np.mean(u[0::3], axis=1)
-    prescribing = {c.prescribed_by for c in equations.rig.mechanism.prescribed}
+    prescribing = equations.rig.mechanism.prescribing
     inputs = np.zeros((u.shape[0], omega.size), dtype=np.complex128)
     for i, source in enumerate(equations.rig.inputs):
         own = _spectrum(u[3 * i]) * (1.0 if source.name in prescribing else hold)

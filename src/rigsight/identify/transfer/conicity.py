@@ -15,11 +15,10 @@ from functools import cache
 
 import sympy as sp
 from scipy.optimize import brentq
-from scipy.stats import norm
 
 from rigsight.effects.symbols import derivative
 from rigsight.errors import InputError
-from rigsight.identify.fit.covariance import LEVEL
+from rigsight.identify.fit.covariance import LEVEL, normal_interval
 from rigsight.rigs import built_in, evaluated
 
 PLAUSIBLE = 0.3
@@ -66,8 +65,7 @@ def estimate_conicity(c_y: float, standard_error: float, r_0: float, b: float) -
             f"A conicity needs c_y above 0 and its standard error at least 0; got c_y = {c_y:g} +- {standard_error:g}."
         )
     largest = math.atan2(b, 2.0 * r_0)
-    width = float(norm.ppf(0.5 + 0.5 * LEVEL)) * standard_error
-    low_c, high_c = c_y - width, c_y + width
+    low_c, high_c = normal_interval(c_y, standard_error)
     top = -0.5 * math.atan(2.0 * r_0 / b)
     value = _bounded(c_y, largest, r_0, b)
     unbounded = None if c_y > creep_factor(top, r_0, b) else _root(c_y, top, largest, r_0, b)

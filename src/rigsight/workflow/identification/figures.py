@@ -44,7 +44,7 @@ def identification_figures(identification: Identification) -> dict[str, tuple[st
                 "Responses of every sensor to every input, measured against the linearized model, 95 % bands"
             )
             if view.constants:
-                what += f", records with {', '.join(f'{name} = {value:g}' for name, value in view.constants.items())}"
+                what += f", records with {view.constants_text}"
             found[file] = (what, view_figure(view, identification.units))
     for record in identification.records if by_record else ():
         drawing = bode_figure(record, identification)

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from scipy.stats import norm
-
 from rigsight.frequency import FrequencyResponse
 from rigsight.frequency.signal_pair import ratio_unit
-from rigsight.identify.fit.covariance import LEVEL
+from rigsight.identify.fit.covariance import LEVEL, normal_interval
 from rigsight.identify.hysteresis.derived import Derived
 from rigsight.identify.identifiability import Identifiability
 from rigsight.identify.identification import (
@@ -281,7 +279,6 @@ def _frequency_response(response: FrequencyResponse) -> dict[str, Any]:
 
 def _hysteresis(found: HysteresisIdentification) -> dict[str, Any]:
     fit, derived = found.calibration.fit, found.calibration.derived
-    width = float(norm.ppf(0.5 + 0.5 * LEVEL))
     errors = fit.standard_errors
     return {
         "effects": found.effects,
@@ -292,10 +289,7 @@ def _hysteresis(found: HysteresisIdentification) -> dict[str, Any]:
             name: {
                 "value": fit.values[name],
                 "std": errors[name],
-                "interval": [
-                    fit.values[name] - width * errors[name],
-                    fit.values[name] + width * errors[name],
-                ],
+                "interval": normal_interval(fit.values[name], errors[name]),
                 "unit": found.units[name],
             }
             for name in fit.free

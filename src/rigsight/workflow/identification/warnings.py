@@ -91,8 +91,7 @@ def offsets_of_records(
 
 def _of_view(view: LinearView, campaign: Campaign) -> list[str]:
     reported, effects = [], [effect.name for effect in campaign.modelled]
-    constants = ", ".join(f"{name} = {value:g}" for name, value in view.constants.items())
-    where = f" ({constants})" if constants else ""
+    where = f" ({view.constants_text})" if view.constants else ""
     near_rest = view.linearization
     if not near_rest.rests:
         reported.append(

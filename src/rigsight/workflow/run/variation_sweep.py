@@ -62,7 +62,6 @@ def variation_sweep(
     dt = 2.0 * math.pi / (_SAMPLES_PER_PERIOD * stop)
     duration = math.log(stop / start) / (_GROWTH * slowest) * slowness
     t = dt * np.arange(round(duration / dt) + 1, dtype=np.float64)
-    prescribing = {coordinate.prescribed_by for coordinate in rig.mechanism.prescribed}
     record = Record(
         name=f"sweep of {amplitude:g} {rig.signal_units[pair.source]}",
         dt=dt,
@@ -76,7 +75,7 @@ def variation_sweep(
         kind="sweep",
         amplitude=amplitude,
         # A prescribed motion is smooth between its samples, whatever the hold of other inputs.
-        hold="band_limited" if pair.source in prescribing else model.hold,
+        hold="band_limited" if pair.source in rig.mechanism.prescribing else model.hold,
     )
     omega = np.geomspace(*band, _N_FREQUENCIES)
     return record, SpectralRatio(pair.source, pair.response, omega, SpectralRatio.width / slowness)
