@@ -27,7 +27,6 @@ from rigsight.identify.linear_view import longest_free_run, near_rest
 from rigsight.inverse import numbers_along_motion, with_all_inputs
 from rigsight.json_data import json_data
 from rigsight.records import Floats, Record, is_constant
-from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.simulate.linearization import Linearization
 
@@ -121,7 +120,8 @@ def check_campaign(campaign: Campaign, effects: Sequence[Effect], say: Callable[
     rig = campaign.rig
     records = tuple(checked_record(rig, record) for record in campaign.records)
     say(PARTS[0])
-    everything = _coarser_records(rig, [with_all_inputs(rig, record) for record in campaign.records])
+    whole = [with_all_inputs(rig, record) for record in campaign.records]
+    everything = tuple(_coarser(r, output) for r, output in zip(whole, shown_by(rig, whole), strict=True))
     coarser = tuple(record for record in everything if record.role == "estimation")
     short = liveliest(coarser, rig, _OF_EFFECTS)
     floors = noise_floors(rig, campaign.records, campaign.drifts)
@@ -194,12 +194,8 @@ def _near_rest(
         return None
 
 
-def _coarser_records(rig: Rig, records: Sequence[Record]) -> tuple[Record, ...]:
-    """Return records sampled as finely as their motion needs."""
-    return tuple(_coarser(r, output) for r, output in zip(records, shown_by(rig, records), strict=True))
-
-
 def _coarser(record: Record, output: str) -> Record:
+    """Return a record sampled as finely as the motion of an output needs."""
     velocity = np.diff(record[output])
     power = np.cumsum(np.abs(np.fft.rfft(velocity - np.mean(velocity))) ** 2)
     highest = float(np.searchsorted(power, _OF_MOTION * power[-1])) / velocity.size

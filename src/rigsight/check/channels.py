@@ -83,8 +83,21 @@ def checked_record(rig: Rig, record: Record) -> CheckedRecord:
     channels = []
     for name, unit in rig.signal_units.items():
         if name in record:
-            octaves = () if name in inputs else _octaves(moving, record[name], record.dt)
-            channels.append(_channel(name, unit, name in inputs, record[name], octaves))
+            samples, is_input = record[name], name in inputs
+            channels.append(
+                Channel(
+                    name,
+                    unit,
+                    is_input,
+                    float(np.min(samples)),
+                    float(np.max(samples)),
+                    int(np.unique(samples).size),
+                    float(np.mean(np.diff(samples) == 0.0)),
+                    float(np.std(samples)),
+                    _white_noise(samples),
+                    () if is_input else _octaves(moving, samples, record.dt),
+                )
+            )
     return CheckedRecord(
         record.name,
         record.role,
@@ -93,21 +106,6 @@ def checked_record(rig: Rig, record: Record) -> CheckedRecord:
         record.n_samples,
         record.clock_uncertainty,
         tuple(channels),
-    )
-
-
-def _channel(name: str, unit: str, is_input: bool, samples: Floats, octaves: tuple[Octave, ...]) -> Channel:
-    return Channel(
-        name,
-        unit,
-        is_input,
-        float(np.min(samples)),
-        float(np.max(samples)),
-        int(np.unique(samples).size),
-        float(np.mean(np.diff(samples) == 0.0)),
-        float(np.std(samples)),
-        _white_noise(samples),
-        octaves,
     )
 
 

@@ -253,16 +253,11 @@ class _Search:
             if (special := t.fit.structure.special_cases) and t.error_over_noise < enough and not at_floor(t)
         ]
         released = {trial.support: trial for trial in bench.trials_of(releases)}
-        return [_better(trial, released.get(trial.support)) for trial in trials]
-
-
-def _better(held: Trial, released: Trial | None) -> Trial:
-    """Return the trial with released special values if its lower error justifies the additional parameters."""
-    return (
-        held
-        if released is None or released.error_over_noise >= _RELEASED * held.error_over_noise
-        else released
-    )
+        # A trial with released values is kept if its lower error justifies the additional parameters.
+        pairs = [(held, released.get(held.support, held)) for held in trials]
+        return [
+            held if new.error_over_noise >= _RELEASED * held.error_over_noise else new for held, new in pairs
+        ]
 
 
 def _independent_of(trials: Sequence[Trial]) -> float:

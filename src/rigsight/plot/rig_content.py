@@ -206,13 +206,10 @@ class _Reader:
         reached = self._reached(drive.signal, through_states=True)
         signal = self._written("drives", drive.name, "signal", drive.signal)
         force = self._written("drives", drive.name, "force", drive.force)
+        along = self._written("drives", drive.name, "along", drive.along)
         lines = [f"signal {signal}"]
         lines += [] if force == drive.name else [f"force {force}"]
-        lines += (
-            []
-            if drive.along.is_Symbol
-            else [f"along {self._written('drives', drive.name, 'along', drive.along)}"]
-        )
+        lines += [] if drive.along.is_Symbol else [f"along {along}"]
         return Place(
             drive.name,
             drive.name,
