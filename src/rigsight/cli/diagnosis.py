@@ -187,24 +187,22 @@ def plan(
     out: options.ResultsFolder = Path("plan"),
     diagnosis: Annotated[
         Path | None,
-        typer.Option(
-            metavar="DIR", show_default="none", help="Results of 'rigsight diagnose': they name the rivals."
-        ),
+        options.optional("DIR", "none", "Results of 'rigsight diagnose': they name the rivals."),
     ] = None,
     rivals: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME,NAME",
-            show_default="those of the diagnosis, else what 'rigsight check' leaves open",
-            help="Effects to be told apart, A+B for two at once.",
+        options.optional(
+            "NAME,NAME",
+            "those of the diagnosis, else what 'rigsight check' leaves open",
+            "Effects to be told apart, A+B for two at once.",
         ),
     ] = None,
     limit: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="NAME=VALUE",
-            show_default="inputs as large as in the records",
-            help="Largest absolute value of an input or a sensor, or of its rate: x=0.02, d(x)=0.5, u=3. Of a constant, such "
+        options.optional(
+            "NAME=VALUE",
+            "inputs as large as in the records",
+            "Largest absolute value of an input or a sensor, or of its rate: x=0.02, d(x)=0.5, u=3. Of a constant, such "
             "as a payload, a value that it may have: m=2. May be repeated.",
         ),
     ] = None,

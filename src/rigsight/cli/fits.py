@@ -210,11 +210,8 @@ def difference(
     out: options.ResultsFolder = Path("difference"),
     at: Annotated[
         str | None,
-        typer.Option(
-            "--at",
-            metavar="VALUE,...",
-            show_default="the order",
-            help="Axis of the trend of three or more, such as temperatures: 20,40,60.",
+        options.optional(
+            "VALUE,...", "the order", "Axis of the trend of three or more, such as temperatures: 20,40,60."
         ),
     ] = None,
     own: options.OwnParts,
