@@ -312,7 +312,7 @@ def can_drift(rig: Rig, known: Mapping[str, float]) -> bool:
         return False
     states = [equation.symbol for equation in structure.equations if equation.symbol not in motion.velocities]
     rates = [*structure.out_of_balance, *(e.rate for e in structure.equations[2 * len(motion.coordinates) :])]
-    still = {*motion.velocities, TIME, *(s for i in range(len(rig.inputs)) for s in input_symbols(i)[1:])}
+    still = {*motion.velocities, *_steady(structure)}
     shown = list(structure.outputs)
     if structure.elimination is not None:
         # Without velocities and input rates the forces are short; otherwise their slopes would be too long.

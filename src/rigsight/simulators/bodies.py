@@ -127,7 +127,8 @@ class Responses:
     def __init__(self, bodies: Bodies) -> None:
         self._bodies = bodies
         folders = bodies.program.include_folders
-        library = ctypes.CDLL(str(library_file(f"{_HEAD}{bodies.c_text}{_ANSWERS}", folders)))
+        head, answers = (template("simulators", part) for part in ("library.c.txt", "answers.c.txt"))
+        library = ctypes.CDLL(str(library_file(f"{head}{bodies.c_text}{answers}", folders)))
         bodies.program.connect(library)
         self._answer = library.answer
         self._answer.restype = None
@@ -142,27 +143,6 @@ class Responses:
         self._bodies.program.check()
         return np.ascontiguousarray(found.T)
 
-
-_HEAD = """#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-#if defined(_WIN32)
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-"""
-
-_ANSWERS = """
-EXPORT void answer(int is_force, long count, const double *a, double *value) {
-    double mass[BODIES_MASSES];
-    long i;
-    for (i = 0; i < count; i++) {
-        if (is_force) bodies_force(a + i * BODIES_FORCE_ARGUMENTS, value + i * BODIES_N, mass);
-        else bodies_mass(a + i * BODIES_MASS_ARGUMENTS, value + i * BODIES_MASSES);
-    }
-}
-"""
 
 _known: dict[int, Bodies] = {}
 """Bodies by their key, of which numbers alone stand in equations."""

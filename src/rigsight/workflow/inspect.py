@@ -12,10 +12,9 @@ import numpy as np
 from rigsight.errors import InputError
 from rigsight.json_data import json_data
 from rigsight.plot import channel_plots
-from rigsight.records.channel_names import closeness
 from rigsight.records.channel_table import open_measurement
+from rigsight.records.clocks import is_time
 from rigsight.records.formats.channel import Channel, ChannelFile, Refused, as_floats, as_stamps
-from rigsight.records.read_record import TIME
 from rigsight.records.record import Floats
 from rigsight.records.sensor_signs import FULL_TURNS, codes, held, is_wrapped, wrapping_counter
 from rigsight.records.signals import clipping
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
     from rigsight.plot import Figure
 
 SCHEMA_VERSION = 1
-_NAMED = 2.0
 _MOST_DRAWN = 40
 """Number of channels in a picture; a flight log holds hundreds."""
 
@@ -92,7 +90,7 @@ def run_inspect(path: str | Path, own_rigs: Iterable[Rig] = ()) -> Inspection:
     path = Path(path)
     with open_measurement(path) as file:
         file, channels = _readable(path, file)
-        times = {c.name: step_and_gaps(as_stamps(c.load())) for c in file.channels if _is_time(c)}
+        times = {c.name: step_and_gaps(as_stamps(c.load())) for c in file.channels if is_time(c.name)}
         if not channels:
             reasons = "; ".join(f"'{one.name}' {one.reason}" for one in file.refused[:5]) or "it is empty"
             raise InputError(f"{path.name} ({file.format}) contains no signal over time: {reasons}.")
@@ -117,13 +115,9 @@ def channel_picture(path: Path) -> Figure:
     """Return a plot of each channel of a file."""
     with open_measurement(path) as opened:
         file, _ = _readable(path, opened)
-        time = next((channel for channel in file.channels if _is_time(channel)), None)
+        time = next((channel for channel in file.channels if is_time(channel.name)), None)
         drawn = [channel for channel in file.channels if channel is not time] or list(file.channels)
         return channel_plots(drawn[:_MOST_DRAWN], time)
-
-
-def _is_time(channel: Channel) -> bool:
-    return closeness(channel.name, TIME) >= _NAMED
 
 
 def _readable(path: Path, file: ChannelFile) -> tuple[ChannelFile, tuple[ChannelSummary, ...]]:
