@@ -31,6 +31,9 @@ from rigsight.simulate.side_by_side import choose_substeps
 MOST_SUBSTEPS = 16
 """Largest number of substeps; a model that is too stiff for it is fitted with this number, and its residuals are recomputed
 accurately."""
+_STILL = 0.1
+"""Share of the measured motion below which that of a model asks for no smaller steps (an assumption): a wrong model that stands
+still needs no accuracy; one that moves about as far is fitted from there."""
 _WORTH_REFINING = 1e-3
 """Share of the cost by which finer steps must be expected to lower it, for a model near the noise floor."""
 _MOST_WORTH = 1e-2
@@ -105,8 +108,7 @@ class Problem:
 
         def chosen(index: int) -> Substeps:
             own, n = data.records[index], data.records[index].record.n_samples
-            # A wrong model may stand still where the rig moves, and its motion asks for no accuracy.
-            at, sizes = (own.parameters(p), states[index]), own.spreads
+            at, sizes = (own.parameters(p), states[index]), _STILL * own.spreads
             try:
                 return choose_substeps(data.structure, own.held, *at, n, data.accuracy, MOST_SUBSTEPS, sizes)
             except SimulationError:
