@@ -108,3 +108,17 @@ def test_a_delay_is_exchanged_for_a_lag_as_late_and_neither_is_asked_in_draws(
         "rigsight.discover.along_motion.inclusion_probabilities", lambda terms, *_: np.ones(terms.shape[1])
     )
     assert along.inclusion(lagged.fit, np.random.default_rng(0)).keys() == {CUBIC.name}
+
+
+def test_at_its_end_the_search_exchanges_a_term_for_every_form_that_contains_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    wider = ("bouc_wen_hysteresis", "iwan_hysteresis", "lugre_friction")
+    bench, along = bench_of(records({}, 0.0, 0), ("coulomb_friction", "presliding_friction", *wider))
+    start = Attempt(frozenset({"presliding_friction"}), [{**VALUES, "T_c": 0.1, "x_p": 1e-4}])
+    (rubbing,) = bench.trials_of([start])
+    monkeypatch.setattr(_Search, "_instead", lambda _, trial, *names: [Attempt(frozenset(names), [])])
+    found = _Search(bench, along, lambda _: None).generalized(rubbing)
+    assert {attempt.support for attempt in found} == {
+        frozenset({"presliding_friction", form}) for form in wider
+    }

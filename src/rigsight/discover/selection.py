@@ -129,6 +129,9 @@ def select(
         pool += search.tried(longer)
         pool += bench.shortened(shorter, best) + search.tried(search.exchanged(best))
         found = _fewest(bench, pool)
+        if found is best and number > 0 and not at_floor(best):
+            pool += search.tried(search.generalized(best))
+            found = _fewest(bench, pool)
         if found is best and number > 0:
             break
         best = found
@@ -207,12 +210,30 @@ class _Search:
         for name in sorted(trial.support):
             found += self._as_late(trial, effects[name])
             for parent in effects[name].parents:
-                if self.along is None or parent not in effects or parent in trial.support:
-                    continue
-                proposed = self.along.instead(trial.fit, effects[name], effects[parent])
-                if proposed is not None:
-                    found.append(self.attempt(proposed, trial))
+                found += self._instead(trial, name, parent)
         return found
+
+    def generalized(self, trial: Trial) -> list[Attempt]:
+        """Return the attempts with a form in place of a term that contains it.
+
+        A search that adds the fewest parameters first may end at a special case of what is missing.
+        """
+        found = []
+        for name in sorted(trial.support):
+            forms = [name]
+            for form in forms:
+                wider = [effect.name for effect in self.bench.effects.values() if form in effect.parents]
+                forms += [one for one in wider if one not in forms]
+            for form in forms[1:]:
+                found += self._instead(trial, name, form)
+        return found
+
+    def _instead(self, trial: Trial, name: str, other: str) -> list[Attempt]:
+        effects = self.bench.effects
+        if self.along is None or other not in effects or other in trial.support:
+            return []
+        proposed = self.along.instead(trial.fit, effects[name], effects[other])
+        return [] if proposed is None else [self.attempt(proposed, trial)]
 
     def _as_late(self, trial: Trial, effect: Effect) -> list[Attempt]:
         """Return the attempts with another delay or lag at the place of one, as late as this one.

@@ -4,11 +4,13 @@ Equation
 --------
 ``spring torque = a k x + (1 - a) k z``,  ``z' = A x' - beta |x'| |z|^(n-1) z - gamma x' |z|^n``
 
-=========  ================================================================================== A          scale of z; redundant (z
--> c z changes nothing), kept at 1 a          ratio of the post-yield stiffness to k, 0 to 1; the effect vanishes at 1 beta
-with gamma: loading branch saturates at z_max = (1/(beta + gamma))^(1/n) gamma      with beta: unloading branch, slope set by beta
-- gamma n          sharpness of the transition, 1 or more =========
-==================================================================================
+=====  ==================================================================================
+A      scale of z; redundant (z -> c z changes nothing), kept at 1
+a      ratio of the post-yield stiffness to k, 0 to 1; the effect vanishes at 1
+beta   with gamma: loading branch saturates at z_max = (1/(beta + gamma))^(1/n)
+gamma  with beta: unloading branch, slope set by beta - gamma
+n      sharpness of the transition, 1 or more
+=====  ==================================================================================
 
 Applies to rubber, dry-friction dampers, rolling contact and magnetorheological elements with rounded, rate-independent
 loops. Does not describe viscous losses, nor pinched or creeping loops.

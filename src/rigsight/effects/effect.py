@@ -222,9 +222,11 @@ class Effect:
         States added, with their rates.
     post_yield_stiffness_ratio
         Parameter that is the ratio of the post-yield stiffness to the initial stiffness. A fit varies the post-yield stiffness
-        and the hysteretic remainder, because records determine these two independently.
+        and the secant stiffness of the remainder, because records determine these two independently.
     yields_over
         Deflection over which a hysteresis yields, of its parameters: where the motion is far larger it is dry friction.
+    mean_yield
+        Of several elements that yield one after the other: their deflection where they do, weighted with their stiffness.
     pulsation
         Parameter that is the angular frequency of a periodic disturbance; a fit starts at a spectral line of the records.
     wave_number
@@ -270,6 +272,7 @@ class Effect:
     states: tuple[State, ...] = ()
     post_yield_stiffness_ratio: str | None = None
     yields_over: sp.Expr | None = None
+    mean_yield: sp.Expr | None = None
     pulsation: str | None = None
     wave_number: str | None = None
     searched_as: tuple[SumAndDifference, ...] = ()

@@ -101,6 +101,7 @@ IWAN_HYSTERESIS = Effect(
     energy=Energy.DISSIPATIVE,
     post_yield_stiffness_ratio="a",
     yields_over=x_s,
+    mean_yield=x_s * sum(w * reach for w, reach in zip(_weights, _reaches, strict=True)) / sum(_weights),
     signature=Signature(gain_trend=GainTrend.RISES),
     spring=a * spring_torque
     + (1 - a) * k * sum(w * z for w, z in zip(_weights, elements, strict=True)) / sum(_weights),

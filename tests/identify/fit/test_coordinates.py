@@ -75,8 +75,38 @@ def test_a_spring_with_memory_moves_as_two_stiffnesses(coordinates: Coordinates)
     theta = coordinates.from_values(VALUES)
     whole, elastic = FREE.index("k"), FREE.index("a")
     stiffness = SCALES["force"] / SCALES["x"]
-    assert np.exp(theta[whole]) == pytest.approx(0.6 * VALUES["k"] / stiffness, rel=1e-12)
+    # The records move 0.02 m; the loop yields at 1/(beta + gamma).
+    secant = 1.0 / (1.0 + 0.02 * (VALUES["beta"] + VALUES["gamma"]))
+    assert np.exp(theta[whole]) == pytest.approx(0.6 * secant * VALUES["k"] / stiffness, rel=1e-12)
     assert theta[elastic] == pytest.approx(0.4 * VALUES["k"] / stiffness, rel=1e-12)
+
+
+def test_a_spring_that_yields_far_below_the_motion_keeps_its_yield_force_as_other_numbers_of_it_move() -> (
+    None
+):
+    structure = compose(RUNNING_GEAR, [effect_named("iwan_hysteresis")])
+    values = {p.name: 1.0 if p.default is None else p.default for p in structure.parameters}
+    values |= {"k_c": 2e3, "a": 0.02, "x_s": 5e-3, "q": -0.4}
+    free = ("k_c", "a", "x_s", "q")
+    searched = Coordinates.of(structure, free, values, {**SCALES, "x": 0.05})
+
+    def yield_force(theta: np.ndarray) -> float:
+        p = dict(zip(structure.names, searched.to_parameters(theta), strict=True))
+        reaches = p["x_s"] * 10.0 ** (-2.7 * (11.0 - 2.0 * np.arange(6)) / 12.0)
+        weights = reaches ** p["q"]
+        return float((1.0 - p["a"]) * p["k_c"] * (weights @ reaches) / np.sum(weights))
+
+    begin = searched.from_values(values)
+    assert yield_force(begin + np.array([0.0, 0.0, 0.0, 0.5])) == pytest.approx(yield_force(begin), rel=0.02)
+    assert yield_force(begin + np.array([0.0, 0.0, 0.5, 0.0])) == pytest.approx(yield_force(begin), rel=0.02)
+
+
+def test_a_loop_that_nothing_bounds_is_searched_by_its_own_stiffness() -> None:
+    values = {**VALUES, "gamma": -VALUES["beta"]}
+    searched = Coordinates.of(STRUCTURE, FREE, values, SCALES)
+    stiffness = SCALES["force"] / SCALES["x"]
+    own = searched.from_values(values)[FREE.index("k")]
+    assert np.exp(own) == pytest.approx(0.6 * VALUES["k"] / stiffness, rel=1e-9)
 
 
 def test_more_memory_leaves_the_stiffness_without_it(coordinates: Coordinates) -> None:

@@ -45,3 +45,11 @@ def test_nearby_starts_end_at_one_place(fit: GreyBoxFit) -> None:
 def test_that_place_is_as_good_as_the_truth(fit: GreyBoxFit) -> None:
     """Seven parameters and initial states take up noise, so that a minimum leaves less than the truth does."""
     assert fit.fit(TRUTH, FREE).cost < fit.fit(TRUTH, ()).cost
+
+
+@pytest.mark.parametrize("x_s", [0.3, 0.6])
+@pytest.mark.parametrize("q", [-0.3, 0.3, 0.8])
+def test_a_spring_three_times_too_stiff_comes_back(fit: GreyBoxFit, x_s: float, q: float) -> None:
+    """Bounds that are far away stopped five of these fits after three or four evaluations, at 60 to 450 times the noise."""
+    start = {**TRUTH, "k": 3.0 * TRUTH["k"], "a": TRUTH["a"] / 3.0, "x_s": x_s * TRUTH["x_s"], "q": q}
+    assert fit.fit(start, FREE, max_evaluations=60, tolerance=1e-5, finish=False).weighted_rms < 1.05

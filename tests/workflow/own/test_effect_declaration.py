@@ -134,6 +134,7 @@ def test_every_field_is_checked(declared):
         ({**changed_parameter(name="v"), "torque": v * x}, "has the name of a signal"),
         ({"special_cases": {"n": 1.0}}, "special_cases names n"),
         ({"yields_over": sp.Symbol("x_y", real=True)}, "yields_over names x_y"),
+        ({"mean_yield": sp.Symbol("x_y", real=True)}, "mean_yield names x_y"),
         ({"ordered": (("c", "d"),)}, "ordered names d, which is not a parameter"),
         (
             {

@@ -1,19 +1,20 @@
 """Search coordinates: parameters in characteristic units, logarithms of positive ones, and well-determined combinations.
 
 Such combinations are the sum and difference of a pair, the excess of one parameter over another that is never larger, and for a
-hysteretic spring the post-yield stiffness and the hysteretic remainder: if the latter is large, the product of the stiffness and
-its post-yield ratio is known far better than either.
+hysteretic spring the post-yield stiffness and the secant stiffness of the remainder at the displacement of the records: of a
+spring that yields far below it, records determine the force at which it yields, and hardly its initial stiffness.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 
-from rigsight.effects import Place
+from rigsight.effects import Effect, Place, placed_dimension
 from rigsight.parameters import Parameter
 from rigsight.records.record import Floats
 from rigsight.simulate import Structure, parameter_vector
@@ -47,10 +48,25 @@ class _Pair:
 
 @dataclass(frozen=True)
 class _Split:
-    """Coordinates for the logarithm of the stiffness with memory, and for the stiffness without memory."""
+    """Coordinates for the logarithm of the secant stiffness with memory, and for the stiffness without memory."""
 
     stiffness: int
     share: int
+    own: NDArray[np.intp]  # parameters on which the secant depends, among all
+    yielded: Callable[
+        ..., Sequence[float]
+    ]  # of these: displacement over yield deflection, and its derivatives
+
+    def softening(self, p: Floats) -> tuple[float, Floats]:
+        """Return the secant stiffness as a share of the initial one, and the derivatives of its logarithm by all parameters."""
+        slopes = np.zeros(p.size)
+        with np.errstate(all="ignore"):
+            yielded, *derivatives = self.yielded(*p[self.own])
+        # Parameters without a yield deflection are those of a spring that does not yield.
+        if not (np.isfinite(yielded) and yielded > 0.0 and np.all(np.isfinite(derivatives))):
+            return 1.0, slopes
+        slopes[self.own] = -np.array(derivatives) / (1.0 + yielded)
+        return 1.0 / (1.0 + yielded), slopes
 
 
 @dataclass(frozen=True)
@@ -105,7 +121,7 @@ class Coordinates:
                 if names[0] in free:
                     lower[free.index(names[0])] = 0.0
                     excesses.append((free.index(names[0]), structure.names.index(names[1])))
-        split = _split(structure, free)
+        split = _split(structure, free, scales)
         if split is not None:
             stiffness = chosen[split.stiffness]
             most = min(stiffness.upper / scale[split.stiffness], _MOST_STIFFNESS)
@@ -141,7 +157,7 @@ class Coordinates:
             p[self.index[larger]] += p[smaller]
         if self.split is not None:
             stiffness, share = self.split.stiffness, self.split.share
-            whole = np.exp(theta[stiffness]) + theta[share]
+            whole = np.exp(theta[stiffness]) / self.split.softening(p)[0] + theta[share]
             p[self.index[stiffness]] = whole * self.scale[stiffness]
             p[self.index[share]] = theta[share] / whole
         return p
@@ -164,7 +180,8 @@ class Coordinates:
             theta[larger] = (plain[larger] - p[smaller]) / self.scale[larger]
         if self.split is not None:
             whole, elastic = own[self.split.stiffness], plain[self.split.share]
-            theta[self.split.stiffness] = np.log(max((1.0 - elastic) * whole, _LEAST_STIFFNESS))
+            secant = self.split.softening(p)[0] * (1.0 - elastic) * whole
+            theta[self.split.stiffness] = np.log(max(secant, _LEAST_STIFFNESS))
             theta[self.split.share] = elastic * whole
         width = np.minimum(self.upper - self.lower, 1e6)
         return np.clip(theta, self.lower + _MARGIN * width, self.upper - _MARGIN * width)
@@ -203,11 +220,14 @@ class Coordinates:
             slopes[self.index[larger]] += slopes[smaller]
         if self.split is not None:
             stiffness, share = self.split.stiffness, self.split.share
-            with_memory, without = np.exp(theta[stiffness]), theta[share]
+            softening, by_parameters = self.split.softening(p)
+            with_memory, without = np.exp(theta[stiffness]) / softening, theta[share]
             whole = with_memory + without
-            columns = [stiffness, share]
-            slopes[self.index[stiffness], columns] = self.scale[stiffness] * np.array([with_memory, 1.0])
-            slopes[self.index[share], columns] = with_memory / whole**2 * np.array([-without, 1.0])
+            growth, own = -with_memory * (by_parameters @ slopes), np.zeros((2, len(self.free)))
+            growth[stiffness] += with_memory
+            own[0], own[1, share] = growth, 1.0
+            slopes[self.index[stiffness]] = self.scale[stiffness] * own.sum(axis=0)
+            slopes[self.index[share]] = (with_memory * own[1] - without * own[0]) / whole**2
         return slopes
 
     def jacobian(self, theta: Floats) -> Floats:
@@ -228,7 +248,7 @@ def _limits_beside_gain(structure: Structure, free: Sequence[str]) -> list[str]:
     ]
 
 
-def _split(structure: Structure, free: Sequence[str]) -> _Split | None:
+def _split(structure: Structure, free: Sequence[str], scales: Mapping[str, float]) -> _Split | None:
     """Return the indices of a spring's stiffness and post-yield ratio, if both are fitted; for the first of several effects."""
     # The spring is that of the joint at which the effect acts; its stiffness must be a single parameter.
     rig = structure.rig
@@ -238,8 +258,23 @@ def _split(structure: Structure, free: Sequence[str]) -> _Split | None:
             share = structure.parameter_name(effect, effect.post_yield_stiffness_ratio)
             stiffness = stiffness_at[rig.acts_at(effect)]
             if stiffness.is_Symbol and stiffness.name in free and share in free:
-                return _Split(free.index(stiffness.name), free.index(share))
+                x = characteristic_value(placed_dimension(effect, "x"), scales)
+                return _Split(free.index(stiffness.name), free.index(share), *_yielded(structure, effect, x))
     return None
+
+
+def _yielded(
+    structure: Structure, effect: Effect, x: float
+) -> tuple[NDArray[np.intp], Callable[..., Sequence[float]]]:
+    """Return the parameters of a yield deflection, and of these a displacement over it and the derivatives of that."""
+    over = effect.mean_yield if effect.mean_yield is not None else effect.yields_over
+    held = dict(structure.fixed)
+    names = {p.name: structure.parameter_name(effect, p.name) for p in effect.parameters}
+    yielded = sp.Integer(0) if over is None else x / over
+    yielded = yielded.subs({s: held[name] for s in yielded.free_symbols if (name := names[s.name]) in held})
+    own = sorted(yielded.free_symbols, key=str)
+    places = [structure.names.index(names[symbol.name]) for symbol in own]
+    return np.array(places, dtype=np.intp), sp.lambdify(own, [yielded, *(yielded.diff(s) for s in own)])
 
 
 def _bounds(parameter: Parameter, scale: float, is_returning: bool) -> tuple[float, float]:

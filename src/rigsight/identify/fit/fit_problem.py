@@ -119,18 +119,18 @@ class Problem:
     def refined(self, theta: Floats) -> bool:
         """Double the substeps if the cost could then be lowered further from here; return True if so."""
         before = self.substeps
-        within_reach = self._removable(theta)
+        within_reach = self.removable(theta)
         self.substeps = [n.with_most(min(2 * n, MOST_SUBSTEPS)) for n in before]
         self._last = None
         if self.substeps != before:
             is_far = self.at(theta).cost > _FAR**2 * self.data.n_readings
-            if self._removable(theta) > within_reach + (_MOST_WORTH if is_far else _WORTH_REFINING):
+            if self.removable(theta) > within_reach + (_MOST_WORTH if is_far else _WORTH_REFINING):
                 self._best = float("inf")
                 return True
         self.substeps, self._last = before, None
         return False
 
-    def _removable(self, theta: Floats) -> float:
+    def removable(self, theta: Floats) -> float:
         """Return the share of the cost by which a full Gauss-Newton step would lower it in the linear approximation."""
         evaluation = self.at(theta)
         if not np.isfinite(evaluation.cost):

@@ -41,6 +41,12 @@ _PLACES = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Start values of limited states between the rounds of a search, as shares of their range."""
 _DEPENDENT_STATE = 1e-9
 """Part of the response to an initial state outside that to the others below which they give it no more than rounding."""
+_REACH = 30.0
+"""Distance of a bound, in units of a coordinate and of its value, from which a search goes on without it; 3 and 10 do nearly
+as well."""
+_WORTH_GOING_ON = 1e-2
+"""Share of the cost by which a full step must be expected to lower it where a search ended; 0.001 does as well, 0.1 gave up in a
+valley."""
 FINE_TOLERANCE = 1e-6
 """Tolerance above which a search is only a rough one, for which kinks do not matter."""
 _VANISHED = 3e-3
@@ -191,7 +197,28 @@ def _projected(own: Floats, states: Floats, residual: Floats) -> tuple[Floats, F
 def searched(
     problem: Problem, theta: Floats, bounds: tuple[Floats, Floats], tolerance: float, max_evaluations: int
 ) -> OptimizeResult:
-    """Return the result of the optimizer."""
+    """Return the result of the optimizer.
+
+    It measures steps in units of the root of the distance to the bound that lies ahead. Where one bound is very far away, the
+    other coordinates may move in such small steps that the cost hardly changes, and the search ends although a full step would
+    lower it. From there it goes on without the bounds that are far away.
+    """
+    result = _searched(problem, theta, bounds, tolerance, max_evaluations)
+    if result.status <= 0 or problem.removable(result.x) < _WORTH_GOING_ON:
+        return result
+    reach = _REACH * np.maximum(np.abs(result.x), 1.0)
+    within_reach = (
+        np.where(result.x - bounds[0] > reach, -np.inf, bounds[0]),
+        np.where(bounds[1] - result.x > reach, np.inf, bounds[1]),
+    )
+    further = _searched(problem, result.x, within_reach, tolerance, max_evaluations)
+    is_inside = np.all((further.x >= bounds[0]) & (further.x <= bounds[1]))
+    return further if is_inside and further.cost < result.cost else result
+
+
+def _searched(
+    problem: Problem, theta: Floats, bounds: tuple[Floats, Floats], tolerance: float, max_evaluations: int
+) -> OptimizeResult:
     return least_squares(
         problem.residual,
         theta,

@@ -113,8 +113,8 @@ def _parameter_faults(effect: Effect) -> Iterator[str]:
     named += [("searched_as", name) for pair in effect.searched_as for name in (pair.first, pair.second)]
     named += [("ordered", name) for pair in effect.ordered for name in pair]
     named += [(field, getattr(effect, field)) for field in _NAME_ONE if getattr(effect, field) is not None]
-    if effect.yields_over is not None:
-        named += [("yields_over", symbol.name) for symbol in effect.yields_over.free_symbols]
+    for field, over in (("yields_over", effect.yields_over), ("mean_yield", effect.mean_yield)):
+        named += [(field, symbol.name) for symbol in (over.free_symbols if over is not None else ())]
     for field, name in named:
         if name not in names:
             yield f"{field} names {name}, which is not a parameter.{nearest(name, names)}"
