@@ -35,7 +35,8 @@ from rigsight.diagnose.verdict.judgement import (
     most_remainder,
     with_unseen,
 )
-from rigsight.diagnose.verdict.ranking import Ranking, doubts, plausible_first, rank, with_last
+from rigsight.diagnose.verdict.plausibility import doubts, plausible_first
+from rigsight.diagnose.verdict.ranking import Ranking, rank, with_last
 from rigsight.effects import Effect
 from rigsight.identify import FitMemory, IdleThreads
 from rigsight.identify.fit.windows import Windowing

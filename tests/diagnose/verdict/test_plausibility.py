@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose.fit_context import FittedModel
-from rigsight.diagnose.verdict.ranking import Grounds, Ranking, doubts, plausible_first
+from rigsight.diagnose.verdict.plausibility import doubts, plausible_first
+from rigsight.diagnose.verdict.ranking import Grounds, Ranking
 
 from ..conftest import with_numbers
 

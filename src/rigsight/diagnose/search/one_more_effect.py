@@ -60,7 +60,6 @@ def with_causes(
     context: FitContext, model: FittedModel, causes: Sequence[ProposedCause], found: Proposal
 ) -> FittedModel:
     """Return a model with further causes, fitted from the values that the motion gives them and the equations."""
-    # More effects must leave less: a set that a short fit leaves far above the model is not followed.
     numbers = {name: value for name, value in found.numbers.items() if name in model.fit.free}
     effects, fit = model.effects, replace(model.fit, values={**model.fit.values, **numbers})
     for cause in causes:
@@ -71,6 +70,7 @@ def with_causes(
         fit = replace(fit, values=values, structure=structure)
     structure, start = fit.structure, replace(model.fit, values=fit.values)
     look = FirstLook(effects, structure, tuple(context.free_parameters(structure)), (start,), float("inf"))
+    # More effects must leave less: a set that a short fit leaves far above the model is not followed.
     short = followed(context, look, promising=False)
     if short.fit.cost > SEARCH.near_the_best * model.fit.cost:
         return short
